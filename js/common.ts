@@ -8,6 +8,7 @@ export type {
   LargeVolume,
   LengthUnit,
   MeshExtra,
+  MeshFileOptions,
   MeshTexture,
   NamedFile,
   PointArray,

@@ -126,8 +126,19 @@ export interface NamedFile {
   bytes: Uint8Array;
 }
 
+/** Options of reading a mesh file. */
+export interface MeshFileOptions {
+  /**
+   * The image of a file that has it in a separate file (obj, ply). Then v points downwards for all formats: that of an
+   * obj or ply becomes 1 - v. It replaces a glb's own texture.
+   */
+  texture?: MeshTexture;
+  /** Buffers and images beside a gltf (or glb), found by their names. */
+  files?: readonly NamedFile[];
+}
+
 /**
- * What is stated about positions in a file. A mesh does not know it: give `space` and `unit` of the volume that it is
+ * Statements about positions in a file. A mesh does not know them: give `space` and `unit` of the volume that it is
  * from, or those of {@link Mesh} if it is from a file.
  */
 export interface SpaceOptions {

@@ -1,6 +1,6 @@
-// What mesh files are read with, and what is stated in those that are written.
+// Options of reading mesh files, and of what is stated in written ones.
 import { checkProperties, choice, denseCopy, invalid, typedArray } from './check.js';
-import type { LengthUnit, MeshExtra, MeshTexture, NamedFile, Space, SpaceOptions } from './data.js';
+import type { LengthUnit, MeshExtra, MeshFileOptions, MeshTexture, NamedFile, Space, SpaceOptions } from './data.js';
 import { checkTexture } from './texture.js';
 import type { Warning } from './warning.js';
 
@@ -12,7 +12,7 @@ export const SPACE_OPTIONS = ['space', 'as', 'unit'] as const;
 
 /** Returns space, space in the file, and unit for the WebAssembly module, empty where they are not given. */
 export function checkedSpaceOptions({ space, as, unit }: SpaceOptions): [space: string, as: string, unit: string] {
-  checkStated({ space, unit });
+  checkStated({ ...(space && { space }), ...(unit && { unit }) });
   if (as === undefined) return [space ?? '', '', unit ?? ''];
   choice('as', as, SPACES);
   if (space === undefined) throw invalid('as', 'needs space as well, that of the mesh');
@@ -23,12 +23,6 @@ export function checkedSpaceOptions({ space, as, unit }: SpaceOptions): [space: 
 export function checkStated({ space, unit }: Pick<MeshExtra, 'space' | 'unit'>): void {
   if (space !== undefined) choice('space', space, SPACES);
   if (unit !== undefined) choice('unit', unit, UNITS);
-}
-
-/** Options of reading a mesh file. */
-export interface MeshFileOptions {
-  texture?: MeshTexture;
-  files?: readonly NamedFile[];
 }
 
 /** Returns the options of reading a mesh file; throws `invalid-argument` naming the one that is wrong. */

@@ -14,15 +14,17 @@ import {
   typedArray,
   vec3,
 } from './check.js';
-import type { LengthUnit, MeshExtra, MeshTexture, PointArray, Space, SpaceOptions, Vec3 } from './data.js';
-import {
-  checkedFileOptions,
-  checkedSpaceOptions,
-  checkStated,
-  type MeshFileOptions,
-  SPACE_OPTIONS,
-  stated,
-} from './mesh-file.js';
+import type {
+  LengthUnit,
+  MeshExtra,
+  MeshFileOptions,
+  MeshTexture,
+  PointArray,
+  Space,
+  SpaceOptions,
+  Vec3,
+} from './data.js';
+import { checkedFileOptions, checkedSpaceOptions, checkStated, SPACE_OPTIONS, stated } from './mesh-file.js';
 import { call, Handle } from './runtime.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
 // Entry points without readers of files lack `RawMeshFile`, which an import by name would demand.
@@ -194,7 +196,7 @@ export let wrapMesh: (
   frame?: Frame,
 ) => Mesh;
 
-/** What the file that a mesh is from states about its positions. */
+/** Statements of the file of a mesh about its positions. */
 type Frame = Pick<MeshExtra, 'space' | 'unit'>;
 
 /**
@@ -220,12 +222,7 @@ export class Mesh {
     };
   }
 
-  private constructor(
-    handle: Handle<RawMesh>,
-    live: boolean,
-    warnings: () => readonly Warning[],
-    frame: Frame = {},
-  ) {
+  private constructor(handle: Handle<RawMesh>, live: boolean, warnings: () => readonly Warning[], frame: Frame = {}) {
     if (!(handle instanceof Handle)) {
       throw invalid('Mesh', 'has no public constructor; use icosphere, fromArrays, parse or marchingCubes');
     }
@@ -262,10 +259,13 @@ export class Mesh {
     const given = checkExtra(extra, vertices, indices.length / 3);
     const { normals, uvs, cornerUvs, colors, texture } = given;
     const warnings = checkedWarnings('warnings', given.warnings);
-    return made(() => {
-      const rest = new RawExtra(normals, uvs, cornerUvs, colors, rawTexture(texture));
-      return RawMesh.fromArrays(positions, indices, rest);
-    }, { ...given, warnings });
+    return made(
+      () => {
+        const rest = new RawExtra(normals, uvs, cornerUvs, colors, rawTexture(texture));
+        return RawMesh.fromArrays(positions, indices, rest);
+      },
+      { ...given, warnings },
+    );
   }
 
   /**
@@ -281,9 +281,8 @@ export class Mesh {
    * A file may state the directions of its axes: see {@link Mesh.space}. Positions are as in the file; those of a glb
    * that {@link Mesh.toBytes} wrote with `space` or `unit` are as they were before.
    *
-   * @param options - `texture`: the image of a file that has it in a separate file (obj, ply). Then v points downwards
-   *   for all formats: that of an obj or ply becomes 1 - v. It replaces a glb's own texture. `files`: buffers and images
-   *   beside a gltf (or glb), found by their names.
+   * @param options - `texture`: the image of a file that has it in a separate file. `files`: those beside a gltf. See
+   *   {@link MeshFileOptions}.
    * @throws {@link VesicleError} `bad-file` naming the format and the field, also for a texture where the file has no
    *   texture coordinates, and naming the file with a buffer that is missing; `too-large`; `invalid-argument`.
    */
@@ -310,7 +309,9 @@ export class Mesh {
     number('iso', iso);
     integer('frame', frame);
     const handle = volumeHandle('volume', volume);
-    return handle.use((raw) => made(() => RawMesh.marchingCubes(raw, iso, frame), { warnings: inFrame(volume.warnings, frame) }));
+    return handle.use((raw) =>
+      made(() => RawMesh.marchingCubes(raw, iso, frame), { warnings: inFrame(volume.warnings, frame) }),
+    );
   }
 
   /** Number of vertices. */
@@ -815,7 +816,7 @@ function edgeBounds(edge: { min: number; max: number }): [number, number] {
   throw invalid('edge.max', `must be more than twice edge.min, ${min}, got ${max}`);
 }
 
-/** What is known of a mesh besides its triangles. */
+/** Properties of a mesh besides its triangles. */
 type Facts = Frame & Pick<MeshExtra, 'warnings'>;
 
 function made(make: () => RawMesh, { space, unit, warnings = [] }: Facts = {}): Mesh {

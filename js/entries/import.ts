@@ -10,6 +10,7 @@ import { checkProperties, typedArray } from '../check.js';
 import type {
   LengthUnit,
   MeshData,
+  MeshFileOptions,
   PointArray,
   PointData,
   Space,
@@ -17,7 +18,7 @@ import type {
   VoxelArray,
 } from '../data.js';
 import { MeshFile, NamedFile, VolumeFile } from '../files.js';
-import { checkedFileOptions, type MeshFileOptions, stated } from '../mesh-file.js';
+import { checkedFileOptions, stated } from '../mesh-file.js';
 import { parsePoints as points } from '../points.js';
 import { call, restart } from '../runtime.js';
 import { rawTexture, textureOf } from '../texture.js';
@@ -27,6 +28,7 @@ export type {
   LengthUnit,
   MeshData,
   MeshExtra,
+  MeshFileOptions,
   MeshTexture,
   NamedFile,
   PointData,

@@ -1,4 +1,4 @@
-//! What positions in mesh files mean: the directions of the axes, and the length of a unit.
+//! Frames of positions in mesh files: the directions of the axes, and the length of a unit.
 //!
 //! 3D Slicer reads `SPACE=RAS` or `SPACE=LPS` in a comment or header of STL, PLY and OBJ and in field data of VTP, and takes
 //! files without for LPS. glTF is in metres with y upwards: a root node maps positions to that, and its `extras` say from

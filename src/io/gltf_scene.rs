@@ -27,7 +27,7 @@ pub(super) struct Part<'a> {
     place: Place,
 }
 
-/// Where a primitive is: in the place of its node, or where the joints of its skin are.
+/// The place of a primitive: that of its node, or those of the joints of its skin.
 #[derive(Clone)]
 enum Place {
     Node(DAffine3),
@@ -113,7 +113,7 @@ impl<'a> Document<'a> {
             if value["extensions"]["KHR_node_visibility"]["visible"] == false {
                 continue;
             }
-            // What is beneath a root that maps positions to glTF's space is read as it was before.
+            // Nodes beneath a root that maps positions to glTF's space are read as they were before.
             let is_frame = is_framed && nodes.is_empty();
             let to_world = if is_frame { DAffine3::IDENTITY } else { parent * transform(value, index)? };
             nodes.push(Node { index, value, to_world });

@@ -65,7 +65,7 @@ pub struct MeshFile {
     pub space: Option<Space>,
     /// The length of a unit of positions, if the file states it, as such a GLB does.
     pub unit: LengthUnit,
-    /// What a user should know about the mesh: what was left out or assumed.
+    /// Warnings about the mesh: parts that were left out, and assumptions.
     pub warnings: Vec<Warning>,
 }
 
@@ -82,7 +82,7 @@ impl From<TriangleMesh> for MeshFile {
     }
 }
 
-/// What a mesh file is read with, besides its bytes.
+/// Inputs for reading a mesh file besides its bytes.
 #[derive(Clone, Debug, Default)]
 pub struct MeshOptions<'a> {
     /// A texture from a separate file (OBJ, PLY); in a GLB it replaces the file's own. As for every mesh with a texture,
@@ -185,14 +185,13 @@ fn parse(bytes: &[u8], files: &[(&str, &[u8])]) -> Result<(&'static str, MeshFil
     if bytes.starts_with(b"glTF") {
         return Ok((glb::FORMAT, glb::parse(bytes, files)?));
     }
-    if ply::is_ply(bytes) {
-        return Ok((ply::FORMAT, ply::parse(bytes)?));
-    }
-    if stl::is_binary(bytes) {
+    if stl::is_binary(bytes) && !ply::is_ply(bytes) {
         return Ok((stl::FORMAT, stl::parse_binary(bytes)?));
     }
-    if let Some(text) = without_byte_order_mark(bytes) {
-        return parse(&text, files);
+    let text = without_byte_order_mark(bytes);
+    let bytes = text.as_deref().unwrap_or(bytes);
+    if ply::is_ply(bytes) {
+        return Ok((ply::FORMAT, ply::parse(bytes)?));
     }
     if glb::is_text(bytes) {
         return Ok((glb::TEXT_FORMAT, glb::parse_text(bytes, files)?));

@@ -178,7 +178,7 @@ struct Header {
     elements: Vec<Element>,
     /// The space that a comment states.
     space: Option<Space>,
-    /// The first line before all elements that is no line of a header, such as a comment without its keyword.
+    /// The first line before all elements that does not belong in a header, such as a comment without its keyword.
     unknown_line: Option<String>,
 }
 

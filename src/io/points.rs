@@ -17,7 +17,7 @@ pub struct PointCloud {
     pub normals: Option<Vec<Vec3>>,
     /// Colours, rgb in 0..1.
     pub colors: Option<Vec<Vec3>>,
-    /// What a user should know about the points: what was left out or assumed.
+    /// Warnings about the points: parts that were left out, and assumptions.
     pub warnings: Vec<Warning>,
 }
 

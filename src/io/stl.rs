@@ -15,7 +15,7 @@ const HEADER: usize = 84;
 /// Size of a triangle in a binary STL file, in bytes: normal, three corners, two unused bytes.
 const RECORD: usize = 50;
 
-/// Number of triangles by which a file is taken for a binary STL although its length is another.
+/// Number of triangles by which a file of another length is recognised as a binary STL.
 const SAMPLE: usize = 64;
 
 /// How many times as long as it is a file can be said to have been: with more, it is no STL.

@@ -21,7 +21,7 @@ pub(super) fn numbered_lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8]
 }
 
 /// Parses a word as a number, as all programs write it: NaN and infinities also as those of Windows do, `-nan(ind)` and
-/// `1.#QNAN`. `None` if it is no number.
+/// `1.#QNAN`. `None` for other words.
 pub(super) fn number(word: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(word).ok()?;
     text.parse().ok().or_else(|| windows_number(text))

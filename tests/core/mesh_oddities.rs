@@ -533,3 +533,12 @@ fn points_without_a_normal_are_said() {
     let apart = (cloud.points[1] - cloud.points[0]).as_dvec3();
     assert!((apart.x - 0.25).abs() < 1e-6 && (apart.y - 0.5).abs() < 1e-6, "{apart}");
 }
+
+#[test]
+fn many_byte_order_marks_are_no_deep_recursion() {
+    for mark in [&b"\xef\xbb\xbf"[..], b"\xff\xfe", b"\xfe\xff"] {
+        let bytes = mark.repeat(400_000);
+        assert!(refusal(&bytes).starts_with("mesh file: format"));
+        assert!(parse_points(&bytes).is_err());
+    }
+}
