@@ -43,7 +43,7 @@ impl Faces {
                     .for_each(|triangle| add(triangle.map(|corner| corner as usize)));
             }
         }
-        (1..count.max(1) - 1).for_each(|k| add([0, k, k + 1]));
+        (1..count.saturating_sub(1)).for_each(|k| add([0, k, k + 1]));
     }
 
     /// Adds warnings about the faces of a file.

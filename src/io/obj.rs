@@ -87,6 +87,8 @@ struct Reader {
     /// The line and the highest index of a face with vertices that are not defined before it.
     ahead: Option<(usize, u32)>,
     faces: Faces,
+    /// Whether the file has free-form surfaces, which are not read.
+    has_patches: bool,
     /// Whether corners refer to texture coordinates and to normals that the file does not have.
     undefined: [bool; 2],
 }
@@ -108,17 +110,18 @@ impl Reader {
             }
             Some(b"vn") => self.normals.push(DVec3::from_slice(&numbers(words, line, 3)?).as_vec3()),
             Some(b"f") => self.face(words, line)?,
+            Some(b"surf" | b"bsp" | b"bzp" | b"cdp") => self.has_patches = true,
             _ => {}
         }
         Ok(())
     }
 
-    /// Adds a vertex from the numbers on its line: a position, and a colour if three more numbers follow. A fourth
-    /// number alone, or before the colour, is a weight, which is ignored.
+    /// Adds a vertex from the numbers on its line: a position, and a colour if three more numbers follow. Ignored are a
+    /// fourth number alone, which is a weight, and one after the colour, its opacity.
     fn vertex(&mut self, numbers: &[f64]) {
         self.positions.push(DVec3::from_slice(numbers));
         match numbers {
-            [_, _, _, r, g, b] | [_, _, _, _, r, g, b] => self.colors.push(DVec3::new(*r, *g, *b).as_vec3()),
+            [_, _, _, r, g, b] | [_, _, _, r, g, b, _] => self.colors.push(DVec3::new(*r, *g, *b).as_vec3()),
             _ => {}
         }
     }
@@ -214,6 +217,9 @@ impl Reader {
                     "Faces refer to {name} that the file does not have: {name} were left out."
                 ));
             }
+        }
+        if self.has_patches {
+            file.warn("Free-form surfaces were left out: save the file as polygons to have them.");
         }
         self.faces.warn(&mut file);
         Ok(file)

@@ -1,8 +1,9 @@
 //! Reader and writer of STL, binary and text: a list of triangles, each with its own corners.
 
+use super::faces::Faces;
 use super::mesh_file::{is_text, push_floats};
 use super::notes::{short, stated_space};
-use super::text::number;
+use super::text::{number, numbered_lines};
 use super::{FormatError, MeshFile, WriteOptions};
 use crate::math::{DVec3, Vec3, triangle};
 use crate::mesh::{MeshError, TriangleMesh, WorldPositions};
@@ -102,28 +103,35 @@ pub(super) fn is_text_stl(bytes: &[u8]) -> bool {
     starts && bytes.get(5).is_none_or(u8::is_ascii_whitespace) && is_text(bytes)
 }
 
-/// Reads the triangles of a text STL file.
+/// Reads the triangles of a text STL file. Facets of more than three vertices, which the format does not have, are read as
+/// polygons.
 pub(super) fn parse_text(bytes: &[u8]) -> Result<MeshFile, FormatError> {
-    let mut corners = WorldPositions::default();
+    let (mut corners, mut facet, mut faces) = (WorldPositions::default(), Vec::new(), Faces::default());
     let mut ended = false;
-    for (number, line) in (1..).zip(bytes.split(|&b| b == b'\n' || b == b'\r')) {
+    for (number, line) in numbered_lines(bytes) {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         let Some(keyword) = words.next() else { continue };
         if keyword.eq_ignore_ascii_case(b"vertex") {
-            corners.push(text_point(words, number)?);
-        } else if keyword.eq_ignore_ascii_case(b"endloop") && corners.len() % 3 != 0 {
-            let problem = "closes a facet that does not have three vertices";
-            return Err(FormatError::invalid(FORMAT, format!("line {number}"), problem));
+            facet.push(text_point(words, number)?);
+        } else if keyword.eq_ignore_ascii_case(b"endloop") {
+            if [1, 2].contains(&facet.len()) {
+                let problem = "closes a facet that does not have three vertices";
+                return Err(FormatError::invalid(FORMAT, format!("line {number}"), problem));
+            }
+            faces.triangulate(facet.len(), |k| facet[k], |t| corners.extend(t.map(|k| facet[k])));
+            facet.clear();
         }
         ended |= keyword.eq_ignore_ascii_case(b"endsolid");
     }
-    if !ended || corners.len() % 3 != 0 {
+    if !ended || facet.len() % 3 != 0 {
         return Err(FormatError::invalid(FORMAT, "endsolid", "is missing: the file ends too early"));
     }
+    // Without lines that end loops, each three vertices are a facet.
+    corners.extend(facet);
     let (positions, origin) = corners.relative();
     let mut file = MeshFile::from(TriangleMesh { origin, ..from_corners(positions) });
-    let first_line = bytes.trim_ascii_start().split(|&b| b == b'\n' || b == b'\r').next();
-    file.space = first_line.and_then(stated_space);
+    file.space = numbered_lines(bytes.trim_ascii_start()).next().and_then(|(_, line)| stated_space(line));
+    faces.warn(&mut file);
     Ok(file)
 }
 

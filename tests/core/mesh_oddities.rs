@@ -111,11 +111,41 @@ fn obj_files_with_normals_and_texture_coordinates_that_are_missing_or_broken() {
         (obj("f 1 2\nf 3\nf\nl 1 2\n", ""), &["fewer than three corners were left out: 3"]),
         (obj("# left to right \\\n", ""), &[]),
         (obj("usemtl none # \\\n", ""), &[]),
+        (obj("cstype bezier\ndeg 1 1\nsurf 0 1 0 1 1 2 3 4\nend\n", ""), &["Free-form surfaces"]),
     ] {
         assert_tetrahedron(text.as_bytes(), warnings);
     }
     let uvs = read(obj("vt 0.25 0.5\n", "/1").as_bytes()).mesh.uvs;
     assert!(uvs.is_some_and(|uvs| uvs.len() == 4));
+}
+
+#[test]
+fn colours_of_obj_vertices_may_have_an_opacity() {
+    for extra in ["1 0 0", "1 0 0 0.5", "255 0 0", "255 0 0 127"] {
+        let text = obj("", "").replacen(
+            "v 0 0 0\nv 2 0 0\nv 0 3 0\nv 0 0 4",
+            &CORNERS.map(|[x, y, z]| format!("v {x} {y} {z} {extra}")).join("\n"),
+            1,
+        );
+        assert_eq!(read(text.as_bytes()).mesh.colors.unwrap()[0], Vec3::X, "{extra}");
+    }
+}
+
+#[test]
+fn facets_of_text_stl_with_more_than_three_vertices() {
+    let facet = |corners: &[[i32; 3]]| {
+        let lines: String = corners.iter().map(|[x, y, z]| format!("vertex {x} {y} {z}\r\n")).collect();
+        format!("facet normal 0 0 0\r\nouter loop\r\n{lines}endloop\r\nendfacet\r\n")
+    };
+    let solid = |facets: &str| format!("solid made\r\n{facets}endsolid\r\n");
+    let step = facet(&[[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0]]);
+    let quad = facet(&[[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]);
+    let found = measure(&read(solid(&format!("{step}{quad}")).as_bytes()).mesh);
+    assert_eq!((found.triangles, found.area), (6, 4.0));
+    let error = refusal(solid(&facet(&[[0, 0, 0], [1, 0, 0]])).as_bytes());
+    assert!(error.starts_with("STL: line 6: closes a facet"), "{error}");
+    let bare = "solid made\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nvertex 0 0 0\nvertex 0 1 0\nvertex 0 0 1\nendsolid";
+    assert_eq!(read(bare.as_bytes()).mesh.triangles.len(), 2);
 }
 
 #[test]
