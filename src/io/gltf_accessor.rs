@@ -232,7 +232,9 @@ pub(super) struct Accessor<'a> {
 }
 
 impl Accessor<'_> {
-    /// Returns component `k` of element `i`, scaled to −1..1 or 0..1 if the file marks the accessor as normalised.
+    /// Returns component `k` of element `i`, scaled to −1..1 or 0..1 if the file marks the accessor as normalised. Never
+    /// inlined: in all its callers it would be 10 kB.
+    #[inline(never)]
     pub(super) fn number(&self, i: usize, k: usize) -> f64 {
         debug_assert!(i < self.count && k < self.width);
         let replaced = self.sparse.as_ref().and_then(|sparse| Some((&sparse.values, sparse.position(i)?)));

@@ -167,12 +167,10 @@ impl<'a> Document<'a> {
             let problem = format!("attributes must be equally many, at most {MOST}, got {counts:?}");
             return Err(FormatError::invalid(FORMAT, "EXT_mesh_gpu_instancing", problem));
         }
-        let vector = |a: &Accessor, i| DVec3::from_array(a.numbers(i));
+        let vector = |a: &Option<Accessor>, i, default| a.as_ref().map_or(default, |a| a.numbers(i));
         let instance = |i: usize| {
-            let turn = turns.as_ref().map_or(DQuat::IDENTITY, |a| DQuat::from_array(a.numbers(i)));
-            let scale = scales.as_ref().map_or(DVec3::ONE, |a| vector(a, i));
-            let at = moves.as_ref().map_or(DVec3::ZERO, |a| vector(a, i));
-            DAffine3::from_scale_rotation_translation(scale, turn.normalize(), at)
+            let turn = turns.as_ref().map_or(NO_ROTATION, |a| a.numbers(i));
+            composed(vector(&scales, i, [1.0; 3]), turn, vector(&moves, i, [0.0; 3]))
         };
         Ok((0..count).map(instance).collect())
     }
@@ -225,15 +223,20 @@ fn transform(node: &Value, index: u64) -> Result<DAffine3, FormatError> {
         return Ok(DAffine3::from_mat4(matrix));
     }
     let scale = numbers(&node["scale"], || field("scale"))?.unwrap_or([1.0; 3]);
-    let rotation = numbers(&node["rotation"], || field("rotation"))?.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+    let rotation = numbers(&node["rotation"], || field("rotation"))?.unwrap_or(NO_ROTATION);
     let translation = numbers(&node["translation"], || field("translation"))?.unwrap_or([0.0; 3]);
-    let rotation = DQuat::from_array(rotation);
-    if rotation.length_squared() <= 0.0 {
+    if rotation.iter().all(|&x| x == 0.0) {
         return Err(FormatError::invalid(FORMAT, field("rotation"), "must be a unit quaternion, got 0"));
     }
-    Ok(DAffine3::from_scale_rotation_translation(
-        DVec3::from_array(scale),
-        rotation.normalize(),
-        DVec3::from_array(translation),
-    ))
+    Ok(composed(scale, rotation, translation))
+}
+
+/// The quaternion of no rotation.
+const NO_ROTATION: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+
+/// Returns the transform that scales, then rotates, then moves. Never inlined, as it is long.
+#[inline(never)]
+fn composed(scale: [f64; 3], rotation: [f64; 4], translation: [f64; 3]) -> DAffine3 {
+    let [scale, translation] = [scale, translation].map(DVec3::from_array);
+    DAffine3::from_scale_rotation_translation(scale, DQuat::from_array(rotation).normalize(), translation)
 }

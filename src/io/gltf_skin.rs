@@ -29,13 +29,16 @@ impl Skin {
         if inverses.as_ref().is_some_and(|inverses| inverses.count < joints.len()) {
             return Err(invalid("has fewer inverseBindMatrices than joints".into()));
         }
-        let joint = |(k, &node): (usize, &u64)| {
-            let missing = || invalid(format!("joint {node} is no node of the scene"));
-            let to_world = to_world.get(node as usize).copied().flatten().ok_or_else(missing)?;
-            let inverse = inverses.as_ref().map(|inverses| DMat4::from_cols_array(&inverses.numbers(k)));
-            Ok(to_world * inverse.map_or(DAffine3::IDENTITY, DAffine3::from_mat4))
-        };
-        joints.iter().enumerate().map(joint).collect::<Result<_, _>>().map(Self)
+        let mut maps = Vec::with_capacity(joints.len());
+        for (k, node) in joints.into_iter().enumerate() {
+            let to_world = usize::try_from(node).ok().and_then(|node| to_world.get(node).copied().flatten());
+            let to_world =
+                to_world.ok_or_else(|| invalid(format!("joint {node} is no node of the scene")))?;
+            let inverse = inverses.as_ref().map(|inverses| inverses.numbers::<16>(k));
+            let inverse = inverse.map(|columns| DAffine3::from_mat4(DMat4::from_cols_array(&columns)));
+            maps.push(to_world * inverse.unwrap_or(DAffine3::IDENTITY));
+        }
+        Ok(Self(maps))
     }
 
     /// Returns a primitive of the skin in its pose, but for positions, which are appended to `positions`.
@@ -46,8 +49,10 @@ impl Skin {
         positions: &mut WorldPositions,
     ) -> Result<TriangleMesh, FormatError> {
         let influences = Influences::new(primitive)?;
-        let maps = (0..mesh.positions.len()).map(|v| influences.blend(v, &self.0));
-        let maps = maps.collect::<Result<Vec<DAffine3>, _>>()?;
+        let mut maps = Vec::with_capacity(mesh.positions.len());
+        for v in 0..mesh.positions.len() {
+            maps.push(influences.blend(v, &self.0)?);
+        }
         let first = mesh.triangles.first().map_or(0, |triangle| triangle[0] as usize);
         if maps.get(first).is_some_and(|map| map.matrix3.determinant() < 0.0) {
             mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));

@@ -4,6 +4,7 @@
 //! Faces of meshes are triangulated by the same means, but whatever their shape: files have faces that are not flat, or
 //! that touch or intersect themselves.
 
+use super::order::sort_pairs;
 use super::predicates::orient2d;
 use super::{DVec2, DVec3};
 
@@ -55,6 +56,13 @@ fn seen_along(direction: DVec3, points: &[DVec3]) -> Vec<DVec2> {
     points.iter().map(|p| DVec2::new(p[right], p[up])).collect()
 }
 
+/// Returns a number that is the same for equal points.
+fn hash(point: DVec2) -> u64 {
+    // Added to 0, negative zero is positive.
+    let [x, y] = [point.x + 0.0, point.y + 0.0].map(f64::to_bits);
+    x.rotate_left(32).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ y
+}
+
 /// Corners of loops, doubly linked. A point has several corners once bridges end in it.
 struct Polygon<'a> {
     points: &'a [DVec2],
@@ -87,15 +95,15 @@ impl<'a> Polygon<'a> {
     /// Returns the corners of one loop, of which those in the same place have the same point.
     fn face(points: &'a [DVec2]) -> Self {
         let count = points.len();
-        let mut order: Vec<usize> = (0..count).collect();
-        let compared = |&i: &usize, &j: &usize| {
-            let (p, q): (DVec2, DVec2) = (points[i], points[j]);
-            p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(i.cmp(&j))
-        };
-        order.sort_unstable_by(compared);
+        let mut pairs: Vec<(u64, u32)> = points.iter().map(|&p| hash(p)).zip(0..).collect();
+        sort_pairs(&mut pairs);
         let mut point = vec![0; count];
-        for equal in order.chunk_by(|&i, &j| points[i] == points[j]) {
-            equal.iter().for_each(|&corner| point[corner] = equal[0] as u32);
+        for same_hash in pairs.chunk_by(|a, b| a.0 == b.0) {
+            let first = same_hash[0].1;
+            for &(_, corner) in same_hash {
+                let is_same = points[corner as usize] == points[first as usize];
+                point[corner as usize] = if is_same { first } else { corner };
+            }
         }
         let next = (1..count).chain([0]).collect();
         let previous = (0..count).map(|k| (k + count - 1) % count).collect();
