@@ -48,7 +48,8 @@ fn document(json: &[u8], field: &str) -> Result<Value, FormatError> {
     if json.len() > JSON_LIMIT && json.len() - data_size(json) > JSON_LIMIT {
         return Err(FormatError::too_large(FORMAT, field, json.len() as u64));
     }
-    // Some programs pad the chunk with zeros.
+    // Some programs start it with a byte order mark, or pad it with zeros.
+    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
     let end = json.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
     serde_json::from_slice(&json[..end])
         .map_err(|error| FormatError::invalid(FORMAT, field, error.to_string()))

@@ -521,7 +521,7 @@ fn unusual_gltf_documents() {
         let error = refusal(&glb(&gltf("", "", &required(name)), &buffer()));
         assert!(error.contains(&format!("{name} is not supported; {accepted}")), "{error}");
     }
-    let padded = format!("{}\0\0\0", gltf("", "", ""));
+    let padded = format!("\u{feff}{}\0\0\0", gltf("", "", ""));
     assert_tetrahedron(&glb(&padded, &buffer()), &[]);
     let hidden = gltf(r#","children":[1]"#, "", "").replace(
         r#"{"translation":[1,0,0]}"#,
