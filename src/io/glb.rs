@@ -90,10 +90,18 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), FormatError> {
             // The format requires unknown chunk types to be ignored.
             _ => {}
         }
-        at += 8 + size;
+        at = next_chunk(content, at + 8 + size);
     }
     let json = json.ok_or_else(|| FormatError::invalid(FORMAT, "JSON chunk", "is missing"))?;
     Ok((json, binary.unwrap_or_default()))
+}
+
+/// Returns where the chunk after one that ends at `end` starts: there, as the length of a chunk includes its padding. Some
+/// programs do not count it.
+fn next_chunk(content: &[u8], end: usize) -> usize {
+    let is_binary = |at: usize| word(content, at + 4, "chunk type").is_ok_and(|kind| kind == BINARY);
+    let aligned = end.next_multiple_of(4);
+    if !is_binary(end) && is_binary(aligned) { aligned } else { end }
 }
 
 /// Reads the little-endian 32-bit number at byte `at`.

@@ -82,7 +82,8 @@ impl<'a> Document<'a> {
     ) -> Result<Elements<'a>, FormatError> {
         let view = self.view(required(value, "bufferView", field)?)?;
         let element = component.size() * width;
-        let stride = view.stride.unwrap_or(element as u64);
+        // Some programs write 0 where they mean none.
+        let stride = view.stride.filter(|&stride| stride > 0).unwrap_or(element as u64);
         if stride < element as u64 {
             let problem = format!("elements of {element} bytes are {stride} apart");
             return Err(FormatError::invalid(FORMAT, field, problem));

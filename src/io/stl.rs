@@ -111,17 +111,22 @@ pub(super) fn parse_text(bytes: &[u8]) -> Result<MeshFile, FormatError> {
     for (number, line) in numbered_lines(bytes) {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         let Some(keyword) = words.next() else { continue };
-        if keyword.eq_ignore_ascii_case(b"vertex") {
+        let is = |name: &[u8]| keyword.eq_ignore_ascii_case(name);
+        if is(b"vertex") {
             facet.push(text_point(words, number)?);
-        } else if keyword.eq_ignore_ascii_case(b"endloop") {
+        } else if is(b"endloop") {
             if [1, 2].contains(&facet.len()) {
                 let problem = "closes a facet that does not have three vertices";
                 return Err(FormatError::invalid(FORMAT, format!("line {number}"), problem));
             }
             faces.triangulate(facet.len(), |k| facet[k], |t| corners.extend(t.map(|k| facet[k])));
             facet.clear();
+        } else {
+            // Some programs write two words.
+            let in_two_words =
+                is(b"end") && words.next().is_some_and(|next| next.eq_ignore_ascii_case(b"solid"));
+            ended |= is(b"endsolid") || in_two_words;
         }
-        ended |= keyword.eq_ignore_ascii_case(b"endsolid");
     }
     if !ended || facet.len() % 3 != 0 {
         return Err(FormatError::invalid(FORMAT, "endsolid", "is missing: the file ends too early"));

@@ -144,6 +144,8 @@ fn facets_of_text_stl_with_more_than_three_vertices() {
     assert_eq!((found.triangles, found.area), (6, 4.0));
     let error = refusal(solid(&facet(&[[0, 0, 0], [1, 0, 0]])).as_bytes());
     assert!(error.starts_with("STL: line 6: closes a facet"), "{error}");
+    let two_words = solid(&quad).replace("endsolid", "END SOLID made");
+    assert_eq!(read(two_words.as_bytes()).mesh.triangles.len(), 2);
     let bare = "solid made\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nvertex 0 0 0\nvertex 0 1 0\nvertex 0 0 1\nendsolid";
     assert_eq!(read(bare.as_bytes()).mesh.triangles.len(), 2);
 }
@@ -523,6 +525,17 @@ fn unusual_gltf_documents() {
     }
     let padded = format!("\u{feff}{}\0\0\0", gltf("", "", ""));
     assert_tetrahedron(&glb(&padded, &buffer()), &[]);
+    let stride = gltf("", "", "").replace(r#""byteLength":48}"#, r#""byteLength":48,"byteStride":0}"#);
+    assert_tetrahedron(&glb(&stride, &buffer()), &[]);
+    // A chunk of JSON whose length does not count its padding.
+    let (json, used) = (
+        format!("{:<1$}", gltf("", "", ""), gltf("", "", "").len().next_multiple_of(4)),
+        gltf("", "", "").len(),
+    );
+    assert!(used < json.len());
+    let mut uncounted = glb(&json, &buffer());
+    uncounted[12..16].copy_from_slice(&(used as u32).to_le_bytes());
+    assert_tetrahedron(&uncounted, &[]);
     let hidden = gltf(r#","children":[1]"#, "", "").replace(
         r#"{"translation":[1,0,0]}"#,
         r#"{"mesh":0,"translation":[9,0,0],"extensions":{"KHR_node_visibility":{"visible":false}}}"#,
