@@ -40,7 +40,9 @@ impl<'a> Document<'a> {
             sparse => Some(self.sparse(sparse, component, width, count, &field)?),
         };
         let normalized = value["normalized"].as_bool().unwrap_or(false);
-        Ok(Accessor { elements, sparse, count: count as usize, width, normalized })
+        let too_large = |_| FormatError::too_large(FORMAT, field, count.saturating_mul(width as u64));
+        let count = usize::try_from(count).map_err(too_large)?;
+        Ok(Accessor { elements, sparse, count, width, normalized })
     }
 
     /// Returns the elements that replace some of an accessor's.

@@ -1,5 +1,6 @@
 //! Mesh and point files as other programs write them: what is unusual in them is read right, or said.
 
+use super::common::Random;
 use super::common::files::glb;
 use vesicle::io::{MeshFile, MeshOptions, parse_mesh, parse_points, read_mesh};
 use vesicle::math::Vec3;
@@ -583,5 +584,45 @@ fn many_byte_order_marks_are_no_deep_recursion() {
         let bytes = mark.repeat(400_000);
         assert!(refusal(&bytes).starts_with("mesh file: format"));
         assert!(parse_points(&bytes).is_err());
+    }
+}
+
+/// Returns small files with what this module is about.
+fn samples() -> Vec<Vec<u8>> {
+    let skins = r#","skins":[{"joints":[0,1],"inverseBindMatrices":6}]"#;
+    let skinned = gltf(r#","skin":0,"weights":[0.5]"#, r#","targets":[{"POSITION":3}]"#, skins)
+        .replace(r#""POSITION":0},"indices""#, r#""POSITION":0,"JOINTS_0":4,"WEIGHTS_0":5},"indices""#);
+    let instanced =
+        gltf(r#","extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":2}}}"#, "", "");
+    let strips = "element tristrips 2\nproperty list int int vertex_indices\n";
+    let header = format!("ply\nformat binary_little_endian 1.0\n{VERTICES}{strips}");
+    let records = [6, 0, 2, 1, 3, 0, 2, 3, 0, 1, -1_i32].map(i32::to_le_bytes).concat();
+    let prism = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 1\nvn 0 0 1\nvt 0 0\nf 1/1/1 2//1 3 4 5 6\nf 7 1 2\n";
+    vec![
+        glb(&skinned, &buffer()),
+        glb(&instanced, &buffer()),
+        ply(&header, &records),
+        prism.into(),
+        ply_text("made by a program\n", "0 51 255", "6 0 1 2 3 0 1\n2 0 1\n").into_bytes(),
+        [stl("SPACE=RAS", 4), (0..120).collect()].concat(),
+    ]
+}
+
+#[test]
+fn unusual_files_with_changed_bytes_give_a_mesh_or_an_error() {
+    for (n, sample) in samples().iter().enumerate() {
+        let mut read = 0;
+        for seed in 0..3000_u64 {
+            let mut random = Random(3000 * n as u64 + seed);
+            let mut bytes = sample.clone();
+            for _ in 0..1 + random.below(3) {
+                let at = random.below(bytes.len());
+                bytes[at] =
+                    if random.below(2) == 0 { b'0' + random.below(10) as u8 } else { random.next() as u8 };
+            }
+            let found = read_mesh(&bytes, MeshOptions::default());
+            read += usize::from(found.is_ok_and(|file| file.mesh.validate().is_ok()));
+        }
+        assert!((100..3000).contains(&read), "sample {n}: {read} of 3000 are read");
     }
 }
