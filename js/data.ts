@@ -136,8 +136,39 @@ export interface MeshExtra {
   colors?: Float32Array;
   /** The image that texture coordinates refer to. */
   texture?: MeshTexture;
+  /** The directions of the axes, if the file that it is from states them, for `Mesh.space`. */
+  space?: Space;
+  /** The length of a unit, if the file that it is from states it, for `Mesh.unit`. */
+  unit?: LengthUnit;
   /** Findings of the file's reader, for `Mesh.warnings`; kinds of its own have the code `reader`. */
   warnings?: readonly Warning[];
+}
+
+/** Options of reading a mesh file. */
+export interface MeshFileOptions {
+  /**
+   * The image of a file that has it in a separate file (obj, ply). Then v points downwards for all formats: that of an
+   * obj or ply becomes 1 - v. It replaces a glb's own texture.
+   */
+  texture?: MeshTexture;
+  /** Buffers and images beside a gltf (or glb), found by their names. */
+  files?: readonly NamedFile[];
+}
+
+/**
+ * Statements about positions in a file. A mesh does not know them: give `space` and `unit` of the volume that it is
+ * from, or those of {@link Mesh} if it is from a file.
+ */
+export interface SpaceOptions {
+  /** Directions of the axes of the mesh. */
+  space?: Space;
+  /**
+   * Directions of the axes in the file, if they are to be others: x and y are then negated, a rotation by 180° about z.
+   * Not without `space`.
+   */
+  as?: Space;
+  /** Length of a unit of positions. */
+  unit?: LengthUnit;
 }
 
 /** The content of a mesh file: the arguments of `Mesh.fromArrays`. */

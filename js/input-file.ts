@@ -1,5 +1,6 @@
 // Files that readers are given: from a page, or from a program's memory or disk.
-import { invalid } from './check.js';
+import { checkProperties, denseCopy, invalid, typedArray } from './check.js';
+import type { NamedFile } from './data.js';
 
 /**
  * A file: that of a page, or a name with the content. Readers take from a `Blob` only what they need; in Node,
@@ -30,4 +31,13 @@ function namedContent(parameter: string, file: unknown): NamedContent {
   const content = file instanceof Blob ? file : bytes;
   if (typeof name === 'string' && (content instanceof Blob || content instanceof Uint8Array)) return { name, content };
   throw invalid(parameter, 'must be a File, a Blob, or { name, bytes } with a Uint8Array or a Blob');
+}
+
+/** Returns files in memory after a check of each; throws `invalid-argument` naming the one that is wrong. */
+export function checkedNamedFiles(parameter: string, files: readonly NamedFile[]): NamedFile[] {
+  return denseCopy(parameter, files).map((file, k) => {
+    const { name, bytes } = checkProperties(`${parameter}[${k}]`, file ?? null, ['name', 'bytes']);
+    if (typeof name !== 'string') throw invalid(`${parameter}[${k}].name`, 'must be a string');
+    return { name, bytes: typedArray(`${parameter}[${k}].bytes`, bytes, Uint8Array) };
+  });
 }

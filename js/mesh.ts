@@ -14,9 +14,21 @@ import {
   typedArray,
   vec3,
 } from './check.js';
-import type { MeshExtra, MeshTexture, PointArray, Vec3 } from './data.js';
+import type {
+  LengthUnit,
+  MeshExtra,
+  MeshFileOptions,
+  MeshTexture,
+  PointArray,
+  Space,
+  SpaceOptions,
+  Vec3,
+} from './data.js';
+import { checkedFileOptions, checkedSpaceOptions, checkStated, SPACE_OPTIONS, stated } from './mesh-file.js';
 import { call, Handle } from './runtime.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
+// Entry points without readers of files lack `RawMeshFile`, which an import by name would demand.
+import * as glue from './vesicle.js';
 import { type RawArrays, RawExtra, RawMesh } from './vesicle.js';
 import { type Volume, volumeHandle, withWarnings, wrapVolume } from './volume.js';
 import type { Warning } from './warning.js';
@@ -177,7 +189,15 @@ export let meshHandle: (parameter: string, mesh: Mesh) => Handle<RawMesh>;
  * Creates a mesh from the handle of a WebAssembly object, for the other modules of the library. A live mesh belongs to
  * its model, which frees it. `warnings` returns those of the mesh.
  */
-export let wrapMesh: (handle: Handle<RawMesh>, live: boolean, warnings: () => readonly Warning[]) => Mesh;
+export let wrapMesh: (
+  handle: Handle<RawMesh>,
+  live: boolean,
+  warnings: () => readonly Warning[],
+  frame?: Frame,
+) => Mesh;
+
+/** Statements of the file of a mesh about its positions. */
+type Frame = Pick<MeshExtra, 'space' | 'unit'>;
 
 /**
  * A triangle mesh.
@@ -192,6 +212,7 @@ export class Mesh {
   readonly #handle: Handle<RawMesh>;
   readonly #live: boolean;
   readonly #warnings: () => readonly Warning[];
+  readonly #frame: Frame;
 
   static {
     wrapMesh = (...parts) => new Mesh(...parts);
@@ -201,13 +222,14 @@ export class Mesh {
     };
   }
 
-  private constructor(handle: Handle<RawMesh>, live: boolean, warnings: () => readonly Warning[]) {
+  private constructor(handle: Handle<RawMesh>, live: boolean, warnings: () => readonly Warning[], frame: Frame = {}) {
     if (!(handle instanceof Handle)) {
       throw invalid('Mesh', 'has no public constructor; use icosphere, fromArrays, parse or marchingCubes');
     }
     this.#handle = handle;
     this.#live = live;
     this.#warnings = warnings;
+    this.#frame = frame;
   }
 
   /**
@@ -235,32 +257,44 @@ export class Mesh {
     const vertices = pointArray('positions', positions).length / 3;
     checkIndices(typedArray('indices', indices, Uint32Array, 3), vertices);
     const given = checkExtra(extra, vertices, indices.length / 3);
-    const { normals, uvs, cornerUvs, colors, texture, warnings } = given;
-    const kept = checkedWarnings('warnings', warnings);
-    return made(() => {
-      const rest = new RawExtra(normals, uvs, cornerUvs, colors, rawTexture(texture));
-      return RawMesh.fromArrays(positions, indices, rest);
-    }, kept);
+    const { normals, uvs, cornerUvs, colors, texture } = given;
+    const warnings = checkedWarnings('warnings', given.warnings);
+    return made(
+      () => {
+        const rest = new RawExtra(normals, uvs, cornerUvs, colors, rawTexture(texture));
+        return RawMesh.fromArrays(positions, indices, rest);
+      },
+      { ...given, warnings },
+    );
   }
 
   /**
-   * Parses a mesh file: glb, ply, stl or obj, detected from the bytes. Duplicate positions are welded.
+   * Parses a mesh file: glb, gltf, ply, stl or obj, detected from the bytes. Duplicate positions are welded; polygons
+   * become triangles, by ear clipping where they are concave. A glb has the shape that a viewer shows without animation:
+   * instances, skins and default morph weights are applied. What was left out or assumed is in {@link Mesh.warnings}.
    *
    * Entry points with one method lack it: use `parseMesh` of `vesicle/import`.
    *
    * The base colour texture inside a glb (png, jpeg or webp) becomes {@link Mesh.texture}. Texture coordinates are
    * those of the file: v points downwards in glb, and upwards in obj and ply.
    *
-   * @param options - `texture`: the image of a file that has it in a separate file (obj, ply). Then v points downwards
-   *   for all formats: that of an obj or ply becomes 1 - v. It replaces a glb's own texture.
+   * A file may state the directions of its axes: see {@link Mesh.space}. Positions are as in the file; those of a glb
+   * that {@link Mesh.toBytes} wrote with `space` or `unit` are as they were before.
+   *
+   * @param options - `texture`: the image of a file that has it in a separate file. `files`: those beside a gltf. See
+   *   {@link MeshFileOptions}.
    * @throws {@link VesicleError} `bad-file` naming the format and the field, also for a texture where the file has no
-   *   texture coordinates; `too-large`; `invalid-argument`.
+   *   texture coordinates, and naming the file with a buffer that is missing; `too-large`; `invalid-argument`.
    */
-  static parse(bytes: Uint8Array, options: { texture?: MeshTexture } = {}): Mesh {
+  static parse(bytes: Uint8Array, options?: MeshFileOptions): Mesh {
     typedArray('bytes', bytes, Uint8Array);
-    const { texture } = checkProperties('options', options, ['texture']);
-    checkTexture(texture);
-    return made(() => RawMesh.parse(bytes, rawTexture(texture)));
+    const { texture, files } = checkedFileOptions(options);
+    const file = call(() => {
+      const beside = files.map(({ name, bytes }) => new glue.NamedFile(name, bytes));
+      return glue.RawMeshFile.parse(bytes, rawTexture(texture), beside);
+    });
+    const facts = call(() => stated(file));
+    return made(() => RawMesh.fromFile(file), facts);
   }
 
   /**
@@ -275,7 +309,9 @@ export class Mesh {
     number('iso', iso);
     integer('frame', frame);
     const handle = volumeHandle('volume', volume);
-    return handle.use((raw) => made(() => RawMesh.marchingCubes(raw, iso, frame), inFrame(volume.warnings, frame)));
+    return handle.use((raw) =>
+      made(() => RawMesh.marchingCubes(raw, iso, frame), { warnings: inFrame(volume.warnings, frame) }),
+    );
   }
 
   /** Number of vertices. */
@@ -319,6 +355,20 @@ export class Mesh {
    */
   get origin(): Vec3 {
     return this.#handle.use((raw) => triple(raw.origin()));
+  }
+
+  /**
+   * The directions of the axes that the file of the mesh states, in the way of 3D Slicer or as {@link Mesh.toBytes} does;
+   * undefined if it states none, and for meshes that are not from a file: those of models and volumes are in the space
+   * of their volume. Copies and edits keep it.
+   */
+  get space(): Space | undefined {
+    return this.#handle.use(() => this.#frame.space);
+  }
+
+  /** The length of a unit that the file of the mesh states; undefined where {@link Mesh.space} may be. */
+  get unit(): LengthUnit | undefined {
+    return this.#handle.use(() => this.#frame.unit);
   }
 
   /**
@@ -385,12 +435,12 @@ export class Mesh {
    * without seams is copied unchanged.
    */
   splitAtSeams(): Mesh {
-    return this.#handle.use((raw) => made(() => raw.splitAtSeams(), this.warnings));
+    return this.#handle.use((raw) => made(() => raw.splitAtSeams(), this.#facts()));
   }
 
   /** Returns the connected components, each as a mesh of its own. */
   components(): Mesh[] {
-    return this.#handle.use((raw) => raw.components()).map((part) => made(() => part, this.warnings));
+    return this.#handle.use((raw) => raw.components()).map((part) => made(() => part, this.#facts()));
   }
 
   /**
@@ -699,23 +749,42 @@ export class Mesh {
    * the header of ply, of obj and of vtp, `extras.warnings` of a glb's `asset`, and their codes, as far as there is room,
    * in the header of stl. mz3 has no room for them. Without any, the bytes are the same as ever.
    *
+   * With `space`, a file says which way its axes point, as 3D Slicer reads it: `SPACE=RAS` or `SPACE=LPS` in the header
+   * of stl, a comment of ply and obj, the field data of vtp. Slicer takes files that do not say it for LPS, and so turns
+   * a surface in RAS by 180° about z. mz3 has no room for it; NiiVue takes it for RAS, which `as` gives.
+   *
+   * With `space` or `unit`, a glb is as glTF wants it: in metres, y upwards, z to the front. One root node maps to that
+   * what is beneath it in the units and space of the mesh, and says in its `extras` from what, so that
+   * {@link Mesh.parse} gives back positions as they were. Without `unit`, lengths are not scaled; without `space`, axes
+   * are kept; without both, there is no such node.
+   *
    * @param options - `recentre`: write positions relative to the origin of the mesh, which moves it there. Default false.
-   *   `warnings`: further ones to write.
-   * @throws {@link VesicleError} `invalid-argument`: no such format; `precision` for stl and mz3, as {@link Mesh.arrays},
-   *   unless it is recentred.
+   *   `warnings`: further ones to write. `space`, `as` and `unit`: what to state, {@link SpaceOptions}; default nothing.
+   * @throws {@link VesicleError} `invalid-argument`: no such format, space or unit; `precision` for stl and mz3, as
+   *   {@link Mesh.arrays}, unless it is recentred.
    */
-  toBytes(format: MeshFormat, options: { recentre?: boolean; warnings?: readonly Warning[] } = {}): Uint8Array {
+  toBytes(
+    format: MeshFormat,
+    options: SpaceOptions & { recentre?: boolean; warnings?: readonly Warning[] } = {},
+  ): Uint8Array {
     choice('format', format, FORMATS);
-    const { recentre = false, warnings } = checkProperties('options', options, ['recentre', 'warnings']);
+    const known = ['recentre', 'warnings', ...SPACE_OPTIONS];
+    const { recentre = false, warnings, ...given } = checkProperties('options', options, known);
     boolean('recentre', recentre);
+    const frame = checkedSpaceOptions(given);
     const moved = recentre ? recentred(this.origin) : [];
     const notes = notesOf(mergedWarnings(moved, this.#warnings(), checkedWarnings('warnings', warnings)));
-    return this.#handle.use((raw) => raw.toBytes(format, recentre, notes));
+    return this.#handle.use((raw) => raw.toBytes(format, recentre, notes, ...frame));
   }
 
   /** Returns an independent copy; for a model's live mesh, of its present state. */
   clone(): Mesh {
-    return this.#handle.use((raw) => made(() => raw.clone(), this.warnings));
+    return this.#handle.use((raw) => made(() => raw.clone(), this.#facts()));
+  }
+
+  /** Returns what copies of the mesh keep. */
+  #facts(): Facts {
+    return { ...this.#frame, warnings: this.warnings };
   }
 
   /**
@@ -747,8 +816,12 @@ function edgeBounds(edge: { min: number; max: number }): [number, number] {
   throw invalid('edge.max', `must be more than twice edge.min, ${min}, got ${max}`);
 }
 
-function made(make: () => RawMesh, warnings: readonly Warning[] = []): Mesh {
-  return wrapMesh(new Handle('Mesh', make), false, () => warnings);
+/** Properties of a mesh besides its triangles. */
+type Facts = Frame & Pick<MeshExtra, 'warnings'>;
+
+function made(make: () => RawMesh, { space, unit, warnings = [] }: Facts = {}): Mesh {
+  const frame = { ...(space && { space }), ...(unit && { unit }) };
+  return wrapMesh(new Handle('Mesh', make), false, () => warnings, frame);
 }
 
 /** Returns the warnings of a volume that concern one of its frames. */
@@ -765,7 +838,9 @@ const EXTRA_ARRAYS = [
 ] as const;
 
 function checkExtra(extra: MeshExtra, vertices: number, triangles: number): MeshExtra {
-  const given = checkProperties('extra', extra, [...EXTRA_ARRAYS.map(([name]) => name), 'texture', 'warnings']);
+  const others = ['texture', 'warnings', 'space', 'unit'];
+  const given = checkProperties('extra', extra, [...EXTRA_ARRAYS.map(([name]) => name), ...others]);
+  checkStated(given);
   for (const [name, stride, part] of EXTRA_ARRAYS) {
     const array = given[name];
     const length = stride * (part === 'vertex' ? vertices : triangles);

@@ -1,6 +1,7 @@
 import { checkProperties, integer, invalid, shallowCopy, typedArray, vec3 } from './check.js';
-import type { Vec3 } from './data.js';
+import type { SpaceOptions, Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
+import { checkedSpaceOptions, SPACE_OPTIONS } from './mesh-file.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawTracker, TriangleCopy } from './vesicle.js';
@@ -309,11 +310,13 @@ export class SurfaceTracker implements Stepper {
    * Encodes the frames tracked so far as an animated glb: one node per frame, shown in turn, each for the frame time of
    * the volume or 0.1 s. Nothing is shown in frames without the object. Warnings are written as by {@link Mesh.toBytes}.
    *
+   * @param options - `space`, `as` and `unit`: what to state, as in {@link Mesh.toBytes}.
    * @throws {@link VesicleError} `invalid-argument` if no frame tracked so far has a surface; `too-large`.
    */
-  toGlb(): Uint8Array {
+  toGlb(options?: SpaceOptions): Uint8Array {
+    const frame = checkedSpaceOptions(checkProperties('options', options, SPACE_OPTIONS));
     const seconds = Math.min(Math.max(this.#frameSeconds, 0.001), 1000);
-    return this.#handle.use((raw) => raw.toGlb(seconds, notesOf(this.#warnings.of())));
+    return this.#handle.use((raw) => raw.toGlb(seconds, notesOf(this.#warnings.of()), ...frame));
   }
 
   /**

@@ -1,6 +1,7 @@
 // Checks the options of reading a volume file.
-import { checkProperties, choice, denseCopy, invalid, typedArray } from './check.js';
-import type { NamedFile, VolumeFileOptions } from './data.js';
+import { checkProperties, choice, invalid, typedArray } from './check.js';
+import type { VolumeFileOptions } from './data.js';
+import { checkedNamedFiles } from './input-file.js';
 
 /** Arguments of the readers in the WebAssembly module: file, data, names and contents of the files beside it, space. */
 export type ReaderArguments = [
@@ -18,12 +19,6 @@ export function readerArguments(bytes: Uint8Array, options: VolumeFileOptions | 
   if (data !== undefined) typedArray('data', data, Uint8Array);
   if (space !== undefined) choice('space', space, ['RAS', 'LPS']);
   if (data !== undefined && files !== undefined) throw invalid('files', 'give either data or files');
-  const beside = files && denseCopy('files', files).map((file, index) => checkedFile(`files[${index}]`, file));
+  const beside = files && checkedNamedFiles('files', files);
   return [bytes, data, beside?.map(({ name }) => name), beside?.map(({ bytes }) => bytes) ?? [], space];
-}
-
-function checkedFile(parameter: string, file: NamedFile): NamedFile {
-  const { name, bytes } = checkProperties(parameter, file ?? null, ['name', 'bytes']);
-  if (typeof name !== 'string') throw invalid(`${parameter}.name`, 'must be a string');
-  return { name, bytes: typedArray(`${parameter}.bytes`, bytes, Uint8Array) };
 }

@@ -105,6 +105,8 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     geometryVersion: 'value',
     texture: 'value',
     origin: 'value',
+    space: 'value',
+    unit: 'value',
     warnings: 'value',
     arrays: 'method',
     copyTo: 'method',

@@ -21,6 +21,7 @@ const ENTRIES = {
   'vesicle/niivue': 'adapters/niivue.js',
   'vesicle/vtk': 'adapters/vtk.js',
   'vesicle/cornerstone': 'adapters/cornerstone.js',
+  'vesicle/dicom': 'dicom/index.js',
   'vesicle/tiff': 'tiff/index.js',
   'vesicle/zarr': 'zarr/index.js',
   'vesicle/element': 'element.js',
@@ -32,7 +33,7 @@ async function bundled(file) {
     entryPoints: [at('pkg', file)],
     ...{ bundle: true, minify: true, format: 'esm', target: 'es2022', write: false, logLevel: 'error' },
     // Imported in Node only, or brought by the page.
-    external: ['node:*', 'zarrita', '@zarrita/*', 'geotiff'],
+    external: ['node:*', 'zarrita', '@zarrita/*', 'geotiff', 'dicom-parser'],
   });
   return outputFiles[0].contents;
 }

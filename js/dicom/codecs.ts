@@ -2,11 +2,27 @@
 import { invalid } from '../check.js';
 import { badDicom, reasonOf } from './error.js';
 
+/** A decoder of images: a library of others. */
+export interface DecoderSource {
+  /** Imports the module of the library that is named in {@link Decoders}. */
+  load: () => Promise<unknown>;
+  /** Address of the library's `.wasm` file, if it has one; by default where the library looks for it. */
+  wasm?: string | URL;
+}
+
 /**
- * Where the decoders' `.wasm` files are, for pages: the address of the folder, or a function from the name of a file to
- * its address. Node finds them itself.
+ * Decoders for compressed images. In Node, those that are installed are found; a page gives those that its images need,
+ * so that bundlers see what is imported. The modules, and the `.wasm` files of their packages:
+ *
+ * - `jpeg`: `@cornerstonejs/codec-libjpeg-turbo-8bit/decodewasmjs`, `libjpegturbowasm_decode.wasm`
+ * - `jpegLossless`: `@cornerstonejs/jpeg-lossless-decoder-js`
+ * - `jpegLs`: `@cornerstonejs/codec-charls/decodewasmjs`, `charlswasm_decode.wasm`
+ * - `jpeg2000`: `@cornerstonejs/codec-openjpeg/decodewasmjs`, `openjpegwasm_decode.wasm`
+ * - `htj2k`: `@cornerstonejs/codec-openjph/wasmjs`, `openjphjs.wasm`
  */
-export type DecoderFiles = string | URL | ((file: string) => string | URL);
+export type Decoders = Partial<Record<DecoderName, DecoderSource>>;
+
+export type DecoderName = 'jpeg' | 'jpegLossless' | 'jpegLs' | 'jpeg2000' | 'htj2k';
 
 /** An image as a decoder returns it: bytes of little-endian integers. */
 export interface Decoded {
@@ -28,59 +44,34 @@ interface Instance {
 
 type Factory = (options: object) => Promise<Record<string, new () => Instance>>;
 
+/** A compression, and the library that decodes it. */
 interface Codec {
   name: string;
-  package: string;
-  load: (files: DecoderFiles | undefined) => Promise<Decode>;
+  option: DecoderName;
+  module: string;
+  /** Name of the class in the library's WebAssembly module; undefined if the library is JavaScript. */
+  kind?: string;
 }
 
-const wasm = (name: string, from: string, kind: string, file: string, imported: () => Promise<unknown>): Codec => ({
-  name,
-  package: from,
-  load: async (files) =>
-    decodeWith(kind, await instantiate((await imported()) as { default: unknown }, name, file, files)),
-});
-
-const JPEG = wasm(
-  'JPEG',
-  '@cornerstonejs/codec-libjpeg-turbo-8bit',
-  'JPEGDecoder',
-  'libjpegturbowasm_decode.wasm',
-  () => import('@cornerstonejs/codec-libjpeg-turbo-8bit/decodewasmjs'),
-);
-const JPEG_LS = wasm(
-  'JPEG-LS',
-  '@cornerstonejs/codec-charls',
-  'JpegLSDecoder',
-  'charlswasm_decode.wasm',
-  () => import('@cornerstonejs/codec-charls/decodewasmjs'),
-);
-const JPEG_2000 = wasm(
-  'JPEG 2000',
-  '@cornerstonejs/codec-openjpeg',
-  'J2KDecoder',
-  'openjpegwasm_decode.wasm',
-  () => import('@cornerstonejs/codec-openjpeg/decodewasmjs'),
-);
-const HTJ2K = wasm(
-  'HTJ2K',
-  '@cornerstonejs/codec-openjph',
-  'HTJ2KDecoder',
-  'openjphjs.wasm',
-  () => import('@cornerstonejs/codec-openjph/wasmjs'),
-);
+const JPEG: Codec = {
+  ...{ name: 'JPEG', option: 'jpeg', kind: 'JPEGDecoder' },
+  module: '@cornerstonejs/codec-libjpeg-turbo-8bit/decodewasmjs',
+};
 const JPEG_LOSSLESS: Codec = {
-  name: 'lossless JPEG',
-  package: '@cornerstonejs/jpeg-lossless-decoder-js',
-  load: async () => {
-    const { Decoder } = await import('@cornerstonejs/jpeg-lossless-decoder-js');
-    return (bytes) => {
-      const decoder = new Decoder();
-      const whole = bytes.slice();
-      const decoded = new Uint8Array(decoder.decompress(whole.buffer, 0, whole.length));
-      return { bytes: decoded, size: decoder.frame.precision > 8 ? 2 : 1 };
-    };
-  },
+  ...{ name: 'lossless JPEG', option: 'jpegLossless' },
+  module: '@cornerstonejs/jpeg-lossless-decoder-js',
+};
+const JPEG_LS: Codec = {
+  ...{ name: 'JPEG-LS', option: 'jpegLs', kind: 'JpegLSDecoder' },
+  module: '@cornerstonejs/codec-charls/decodewasmjs',
+};
+const JPEG_2000: Codec = {
+  ...{ name: 'JPEG 2000', option: 'jpeg2000', kind: 'J2KDecoder' },
+  module: '@cornerstonejs/codec-openjpeg/decodewasmjs',
+};
+const HTJ2K: Codec = {
+  ...{ name: 'HTJ2K', option: 'htj2k', kind: 'HTJ2KDecoder' },
+  module: '@cornerstonejs/codec-openjph/wasmjs',
 };
 
 /** Decoders by transfer syntax (PS3.5, annex A.4), after the prefix of all. */
@@ -93,50 +84,74 @@ const CODECS: Record<string, Codec> = {
 const PREFIX = '1.2.840.10008.1.2.';
 
 /** Returns the decoder of a transfer syntax; throws `bad-file` if there is none, `invalid-argument` if it is missing. */
-export async function decoderOf(transferSyntax: string, files: DecoderFiles | undefined): Promise<Decode> {
+export async function decoderOf(transferSyntax: string, decoders: Decoders): Promise<Decode> {
   const codec = transferSyntax.startsWith(PREFIX) ? CODECS[transferSyntax.slice(PREFIX.length)] : undefined;
   if (!codec)
     throw badDicom(
       'transfer syntax',
       `${transferSyntax} is not supported; accepted: uncompressed, deflated, RLE, JPEG, JPEG-LS, JPEG 2000, HTJ2K`,
     );
-  return codec.load(files).catch((error: unknown) => {
-    const remedy = `install ${codec.package}, and in a page pass the place of its .wasm file as option "decoders"`;
-    throw invalid(
-      'decoders',
-      `the images are compressed as ${codec.name}, whose decoder could not be loaded (${reasonOf(error)}): ${remedy}`,
-    );
-  });
+  try {
+    return await loaded(codec, decoders[codec.option]);
+  } catch (error) {
+    const what = `the images are compressed as ${codec.name}, whose decoder is not there (${reasonOf(error)})`;
+    throw invalid(`decoders.${codec.option}`, `${what}: install the package of ${codec.module}, and in a page pass it`);
+  }
 }
 
-/** Instances of modules by file, which are kept, since an instance takes longer than an image. */
-const instances = new Map<string, Promise<Awaited<ReturnType<Factory>>>>();
+/** Loaded decoders by what loads them, since an instance of a module takes longer than an image. */
+const instances = new Map<unknown, Promise<Decode>>();
 
-function instantiate(module: { default: unknown }, name: string, file: string, files: DecoderFiles | undefined) {
-  const address = files === undefined ? undefined : addressOf(file, files);
-  const key = `${file} ${address ?? ''}`;
-  const made = instances.get(key) ?? factoryOf(module)(optionsFor(name, address));
+function loaded(codec: Codec, source: DecoderSource = installed(codec)): Promise<Decode> {
+  const key = source.load;
+  const made = instances.get(key) ?? instantiated(codec, source);
   instances.set(key, made);
   made.catch(() => instances.delete(key));
   return made;
 }
 
-/** A module of CommonJS, whose export some bundlers put into another `default`. */
-function factoryOf({ default: made }: { default: unknown }): Factory {
-  return (typeof made === 'function' ? made : (made as { default: unknown }).default) as Factory;
-}
+/** Decoders that Node finds. */
+const found = new Map<Codec, DecoderSource>();
 
-function optionsFor(name: string, address: string | undefined): object {
+function installed(codec: Codec): DecoderSource {
   const { process } = globalThis as { process?: { versions?: { node?: string } } };
-  const isNode = process?.versions?.node !== undefined;
-  if (address === undefined && !isNode) throw new Error(`where the .wasm file for ${name} is was not given`);
-  const silent = () => {};
-  return { print: silent, printErr: silent, ...(address !== undefined && { locateFile: () => address }) };
+  if (process?.versions?.node === undefined) throw new Error('it was not given');
+  const known = found.get(codec);
+  if (known) return known;
+  const { module } = codec;
+  // Bundlers leave an import by a variable alone.
+  const source = { load: () => import(/* webpackIgnore: true */ /* @vite-ignore */ module) };
+  found.set(codec, source);
+  return source;
 }
 
-function addressOf(file: string, files: DecoderFiles): string {
-  if (typeof files === 'function') return String(files(file));
-  return `${String(files).replace(/\/?$/, '/')}${file}`;
+async function instantiated({ kind }: Codec, { load, wasm }: DecoderSource): Promise<Decode> {
+  const module = (await load()) as { default?: unknown };
+  if (kind === undefined) return losslessJpeg(module);
+  const silent = () => {};
+  const options = { print: silent, printErr: silent, ...(wasm !== undefined && { locateFile: () => String(wasm) }) };
+  return decodeWith(kind, await factoryOf(module)(options));
+}
+
+/** A module of CommonJS, whose export some bundlers put into another `default`. */
+function factoryOf({ default: made }: { default?: unknown }): Factory {
+  return (typeof made === 'function' ? made : (Object(made) as { default: unknown }).default) as Factory;
+}
+
+/** The class of the decoder of lossless JPEG. */
+type LosslessDecoder = new () => {
+  decompress(buffer: ArrayBuffer, offset: number, length: number): ArrayBuffer;
+  frame: { precision: number };
+};
+
+function losslessJpeg(module: object): Decode {
+  const { Decoder } = module as { Decoder: LosslessDecoder };
+  return (bytes) => {
+    const decoder = new Decoder();
+    const whole = bytes.slice();
+    const decoded = new Uint8Array(decoder.decompress(whole.buffer, 0, whole.length));
+    return { bytes: decoded, size: decoder.frame.precision > 8 ? 2 : 1 };
+  };
 }
 
 function decodeWith(kind: string, module: Record<string, new () => Instance>): Decode {

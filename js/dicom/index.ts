@@ -31,7 +31,7 @@ import type { Frame, Skipped } from './types.js';
 import { type DicomProgress, type DicomReadOptions, type DicomVolume, ImageVolume } from './volume.js';
 
 export type { InputFile, InputFiles } from '../input-file.js';
-export type { DecoderFiles } from './codecs.js';
+export type { DecoderName, DecoderSource, Decoders } from './codecs.js';
 export type { Segment, Skipped } from './types.js';
 export { type DicomProgress, type DicomReadOptions, DicomVolume } from './volume.js';
 

@@ -1,7 +1,7 @@
 // The voxels of images: from bytes, compressed or not, to typed arrays of stored values.
 import type { DataSet, Element } from 'dicom-parser';
 import type { VoxelArray } from '../data.js';
-import { type Decode, type Decoded, type DecoderFiles, decoderOf } from './codecs.js';
+import { type Decode, type Decoded, type Decoders, decoderOf } from './codecs.js';
 import { badDicom, reasonOf } from './error.js';
 import { FLOAT_PIXELS, type Parser, PIXEL_DATA, readWhole } from './parser.js';
 import { decodeRle } from './rle.js';
@@ -24,10 +24,10 @@ export function arrayOf({ bitsAllocated, signed, float }: PixelFormat): new (len
 /** Reads the voxels of images; keeps the file of the last one, if that is compressed and has several. */
 export class PixelReader {
   readonly #parser: Parser;
-  readonly #decoders: DecoderFiles | undefined;
+  readonly #decoders: Decoders;
   #last: { file: Source; data: DataSet } | undefined;
 
-  constructor(parser: Parser, decoders: DecoderFiles | undefined) {
+  constructor(parser: Parser, decoders: Decoders) {
     this.#parser = parser;
     this.#decoders = decoders;
   }

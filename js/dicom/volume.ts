@@ -5,7 +5,7 @@ import { VesicleError } from '../error.js';
 import { withPause } from '../pause.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import type { Warning } from '../warning.js';
-import type { DecoderFiles } from './codecs.js';
+import type { Decoders } from './codecs.js';
 import { badDicom } from './error.js';
 import { affineOf, distancesOf, evennessOf } from './geometry.js';
 import type { Stack } from './grouping.js';
@@ -27,11 +27,8 @@ export interface DicomReadOptions {
    * them evenly, by linear interpolation between neighbouring slices. Default `'refuse'`.
    */
   uneven?: 'refuse' | 'resample';
-  /**
-   * Where the `.wasm` files of decoders are, which pages need for JPEG, JPEG-LS, JPEG 2000 and HTJ2K: the address of a
-   * folder, or a function from the name of a file to its address. Node finds them itself.
-   */
-  decoders?: DecoderFiles;
+  /** Decoders for compressed images, which pages give and Node finds; see {@link Decoders}. */
+  decoders?: Decoders;
   /** Aborts the reading, which then rejects with `signal.reason`. */
   signal?: AbortSignal;
   /** Called after each image that has been read. */
@@ -110,7 +107,7 @@ export abstract class DicomVolume {
    */
   async read(given?: DicomReadOptions): Promise<VolumeInit> {
     const options = checkProperties<DicomReadOptions>('options', given, OPTIONS);
-    const { uneven = 'refuse', signal, onProgress, decoders } = options;
+    const { uneven = 'refuse', signal, onProgress, decoders = {} } = options;
     choice('uneven', uneven, ['refuse', 'resample']);
     checkSignal(signal);
     checkListener('onProgress', onProgress);
@@ -127,7 +124,7 @@ export abstract class DicomVolume {
 export interface Reading {
   signal: AbortSignal | undefined;
   onProgress: ((progress: DicomProgress) => void) | undefined;
-  decoders: DecoderFiles | undefined;
+  decoders: Decoders;
 }
 
 function remarksOn({ units, padding, inverted }: Series): string[] {

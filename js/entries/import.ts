@@ -6,11 +6,11 @@
  *
  * @module vesicle/import
  */
-import { checkProperties, typedArray } from '../check.js';
+import { typedArray } from '../check.js';
 import type {
   LengthUnit,
   MeshData,
-  MeshTexture,
+  MeshFileOptions,
   PointArray,
   PointData,
   Space,
@@ -18,10 +18,11 @@ import type {
   VolumeInit,
   VoxelArray,
 } from '../data.js';
-import { MeshFile, VolumeFile } from '../files.js';
+import { MeshFile, NamedFile, VolumeFile } from '../files.js';
+import { checkedFileOptions, stated } from '../mesh-file.js';
 import { parsePoints as points } from '../points.js';
 import { call, restart } from '../runtime.js';
-import { checkTexture, rawTexture, textureOf } from '../texture.js';
+import { rawTexture, textureOf } from '../texture.js';
 import { readerArguments } from '../volume-file.js';
 import type { Warning } from '../warning.js';
 
@@ -29,6 +30,7 @@ export type {
   LengthUnit,
   MeshData,
   MeshExtra,
+  MeshFileOptions,
   MeshTexture,
   NamedFile,
   PointData,
@@ -61,14 +63,18 @@ export function parseVolume(bytes: Uint8Array, options?: VolumeFileOptions): Vol
  * Parses a mesh file like `Mesh.parse` of `vesicle`, and returns what `Mesh.fromArrays` takes:
  * `const { positions, indices, ...extra } = parseMesh(bytes)`.
  *
- * @param options - `texture`: the image of a file that has it in a separate file (obj, ply).
- * @throws {@link VesicleError} `bad-file` naming the format and the field; `too-large`; `invalid-argument`.
+ * @param options - `texture`: the image of a file that has it in a separate file (obj, ply). `files`: buffers and images
+ *   beside a gltf, found by their names.
+ * @throws {@link VesicleError} `bad-file` naming the format and the field, or the file that is missing; `too-large`;
+ *   `invalid-argument`.
  */
-export function parseMesh(bytes: Uint8Array, options: { texture?: MeshTexture } = {}): MeshData {
+export function parseMesh(bytes: Uint8Array, options?: MeshFileOptions): MeshData {
   typedArray('bytes', bytes, Uint8Array);
-  const { texture } = checkProperties('options', options, ['texture']);
-  checkTexture(texture);
-  return inOwnInstance(() => meshData(MeshFile.parse(bytes, rawTexture(texture))));
+  const { texture, files } = checkedFileOptions(options);
+  return inOwnInstance(() => {
+    const beside = files.map(({ name, bytes }) => new NamedFile(name, bytes));
+    return meshData(MeshFile.parse(bytes, rawTexture(texture), beside));
+  });
 }
 
 /**
@@ -121,5 +127,6 @@ function meshData(file: MeshFile): MeshData {
     ...(cornerUvs && { cornerUvs }),
     ...(colors && { colors }),
     ...(texture && { texture: textureOf(texture) }),
+    ...stated(file),
   };
 }

@@ -18,8 +18,8 @@ export interface Plane {
   after: number;
 }
 
-/** Weights of red, green and blue in the luminance, those of ITU-R BT.601. */
-export const WEIGHTS = [0.299, 0.587, 0.114] as const;
+/** Weights of red, green and blue in the luminance, those of ITU-R BT.709, as for other volumes. */
+export const WEIGHTS = [0.2126, 0.7152, 0.0722] as const;
 
 /** Number of blocks that are decompressed at the same time. */
 const TOGETHER = 8;

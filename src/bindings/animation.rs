@@ -2,26 +2,22 @@
 
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
+use super::convert::write_options;
 use super::error::Failure;
 use super::mesh::RawMesh;
 use vesicle::io::AnimationWriter;
 
 /// The raw handle with which `animationGlb` builds an animated GLB file, one frame at a time.
 #[wasm_bindgen]
-#[derive(Default)]
 pub struct RawAnimation(AnimationWriter);
 
 #[wasm_bindgen]
 impl RawAnimation {
-    /// Creates an animation without frames.
+    /// Creates an animation without frames, with notes for the reader of the file: lines `code: text`. `space` is that of
+    /// the meshes, `written_as` that in the file, and `unit` the unit of positions, each empty if it is not to be stated.
     #[wasm_bindgen(constructor)]
-    pub fn new() -> RawAnimation {
-        RawAnimation::default()
-    }
-
-    /// Sets notes for the reader of the file: lines `code: text`.
-    pub fn note(&mut self, notes: &str) {
-        self.0.note(notes);
+    pub fn new(notes: &str, space: &str, written_as: &str, unit: &str) -> RawAnimation {
+        RawAnimation(AnimationWriter::new(&write_options(notes, [space, written_as, unit])))
     }
 
     /// Appends a frame that shows a mesh in its current state.

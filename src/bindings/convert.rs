@@ -8,6 +8,7 @@ use wasm_bindgen::JsCast;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::error::Failure;
+use vesicle::io::WriteOptions;
 use vesicle::math::{DAffine3, DVec3, Vec2, Vec3};
 use vesicle::mesh::WorldPositions;
 use vesicle::methods::{ParamInput, ParamSpec, Parameters};
@@ -143,6 +144,18 @@ pub fn space_name(space: Space) -> &'static str {
         Space::Ras => "RAS",
         Space::Lps => "LPS",
     }
+}
+
+/// Returns the space of a name, as [`space_name`] returns it; `None` for any other.
+pub fn space_named(name: &str) -> Option<Space> {
+    [Space::Ras, Space::Lps].into_iter().find(|&space| space_name(space) == name)
+}
+
+/// Returns how a mesh is written to a file: notes, the names of its space and of that in the file, and of its unit, each
+/// empty if it is not given.
+pub fn write_options<'a>(notes: &'a str, [space, written_as, unit]: [&str; 3]) -> WriteOptions<'a> {
+    let [space, written_as] = [space, written_as].map(space_named);
+    WriteOptions { notes, space, written_as, unit: unit_named(unit) }
 }
 
 /// Returns the name of a unit of length; that of the unknown one is empty.

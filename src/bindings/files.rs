@@ -6,9 +6,9 @@ use js_sys::{
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{columns, flat, in_world, packed, space_name, to_js, unit_name};
-use super::readers::{read_mesh, read_volume};
+use super::readers::{NamedFile, read_mesh, read_volume};
 use super::texture::RawTexture;
-use vesicle::mesh::TriangleMesh;
+use vesicle::io;
 use vesicle::volume::{Volume, Voxels};
 
 /// The content of a volume file.
@@ -94,49 +94,67 @@ impl VolumeFile {
 
 /// The content of a mesh file.
 #[wasm_bindgen]
-pub struct MeshFile(TriangleMesh);
+pub struct MeshFile(io::MeshFile);
 
 #[wasm_bindgen]
 impl MeshFile {
     /// Reads a mesh from the bytes of a file in any supported format, with a texture from a separate image if one is
-    /// given.
-    pub fn parse(file: &Uint8Array, texture: Option<RawTexture>) -> Result<MeshFile, JsValue> {
-        Ok(MeshFile(read_mesh(file, texture)?))
+    /// given, and the files beside it.
+    pub fn parse(
+        file: &Uint8Array,
+        texture: Option<RawTexture>,
+        files: Vec<NamedFile>,
+    ) -> Result<MeshFile, JsValue> {
+        Ok(MeshFile(read_mesh(file, texture, files)?))
     }
 
     /// Returns the positions of the vertices as packed xyz, in double precision if the mesh is far away for its size.
     pub fn positions(&self) -> JsValue {
-        in_world(&self.0.positions, self.0.origin)
+        in_world(&self.0.mesh.positions, self.0.mesh.origin)
     }
 
     /// Returns the triangles as three vertex indices each.
     pub fn indices(&self) -> Vec<u32> {
-        self.0.triangles.as_flattened().to_vec()
+        self.0.mesh.triangles.as_flattened().to_vec()
     }
 
     /// Returns the normals of the vertices as packed xyz, if the file has them.
     pub fn normals(&self) -> Option<Vec<f32>> {
-        self.0.normals.as_deref().map(packed)
+        self.0.mesh.normals.as_deref().map(packed)
     }
 
     /// Returns the texture coordinates as u and v of each vertex, if the file has them and no vertex has several.
     pub fn uvs(&self) -> Option<Vec<f32>> {
-        self.0.uvs.as_deref().map(flat)
+        self.0.mesh.uvs.as_deref().map(flat)
     }
 
     /// Returns the texture coordinates as u and v of the three corners of each triangle, if vertices have several.
     #[wasm_bindgen(js_name = cornerUvs)]
     pub fn corner_uvs(&self) -> Option<Vec<f32>> {
-        self.0.corner_uvs.as_deref().map(|corners| flat(corners.as_flattened()))
+        self.0.mesh.corner_uvs.as_deref().map(|corners| flat(corners.as_flattened()))
     }
 
     /// Returns the colours as red, green and blue of each vertex, in 0..1, if the file has them.
     pub fn colors(&self) -> Option<Vec<f32>> {
-        self.0.colors.as_deref().map(packed)
+        self.0.mesh.colors.as_deref().map(packed)
     }
 
     /// Returns the texture, if the mesh has one.
     pub fn texture(&self) -> Option<RawTexture> {
-        self.0.texture.clone().map(RawTexture)
+        self.0.mesh.texture.clone().map(RawTexture)
+    }
+    /// Returns the space that the file states, `RAS` or `LPS`, or an empty string if it states none.
+    pub fn space(&self) -> String {
+        self.0.space.map_or("", space_name).to_owned()
+    }
+
+    /// Returns the length of a unit: `m`, `mm` or `um`, or an empty string if the file does not state it.
+    pub fn unit(&self) -> String {
+        unit_name(self.0.unit).to_owned()
+    }
+
+    /// Returns what a user should know about the mesh, as an array of `Warning`.
+    pub fn warnings(&self) -> Result<JsValue, JsValue> {
+        Ok(to_js(&self.0.warnings)?)
     }
 }

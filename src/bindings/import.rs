@@ -3,10 +3,12 @@
 use js_sys::Uint8Array;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
+use super::convert::{space_name, to_js, unit_name};
 use super::mesh::{RawMesh, triangle_list};
-use super::readers::{read_mesh, read_volume};
+use super::readers::{NamedFile, read_mesh, read_volume};
 use super::texture::RawTexture;
 use super::volume::RawVolume;
+use vesicle::io::MeshFile;
 
 #[wasm_bindgen]
 impl RawVolume {
@@ -26,9 +28,41 @@ impl RawVolume {
 
 #[wasm_bindgen]
 impl RawMesh {
+    /// Returns the mesh of a file.
+    #[wasm_bindgen(js_name = fromFile)]
+    pub fn from_file(file: RawMeshFile) -> RawMesh {
+        RawMesh(triangle_list(file.0.mesh))
+    }
+}
+
+/// The raw content of a mesh file.
+#[wasm_bindgen]
+pub struct RawMeshFile(MeshFile);
+
+#[wasm_bindgen]
+impl RawMeshFile {
     /// Reads a mesh from the bytes of a file in any supported format, with a texture from a separate image if one is
-    /// given.
-    pub fn parse(file: &Uint8Array, texture: Option<RawTexture>) -> Result<RawMesh, JsValue> {
-        Ok(RawMesh(triangle_list(read_mesh(file, texture)?)))
+    /// given, and the files beside it.
+    pub fn parse(
+        file: &Uint8Array,
+        texture: Option<RawTexture>,
+        files: Vec<NamedFile>,
+    ) -> Result<RawMeshFile, JsValue> {
+        Ok(RawMeshFile(read_mesh(file, texture, files)?))
+    }
+
+    /// Returns what a user should know about the mesh, as an array of `Warning`.
+    pub fn warnings(&self) -> Result<JsValue, JsValue> {
+        Ok(to_js(&self.0.warnings)?)
+    }
+
+    /// Returns the space that the file states, `RAS` or `LPS`, or an empty string if it states none.
+    pub fn space(&self) -> String {
+        self.0.space.map_or("", space_name).to_owned()
+    }
+
+    /// Returns the length of a unit: `m`, `mm` or `um`, or an empty string if the file does not state it.
+    pub fn unit(&self) -> String {
+        unit_name(self.0.unit).to_owned()
     }
 }

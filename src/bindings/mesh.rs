@@ -9,11 +9,12 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{
     coordinates, corner_coordinates, flat, packed, point, points, to_js, triangles, world_points,
+    write_options,
 };
 use super::error::Failure;
 use super::texture::RawTexture;
 use super::volume::RawVolume;
-use vesicle::io::{MeshFormat, write_noted_mesh};
+use vesicle::io::{MeshFormat, write_mesh_with};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{
     Measures, Mesh, MeshReport, TriangleMesh, WorldPositions, curvature, geodesic_distances, measure, report,
@@ -317,15 +318,26 @@ impl RawMesh {
 
     /// Returns the mesh as the bytes of a file; `format` is glb, ply, stl, obj, vtp or mz3. If it `is_recentred`, positions
     /// are those relative to the origin of the mesh. Each line of `notes` for the reader of the file is `code: text`.
+    /// `space` is that of the mesh, `written_as` that in the file, and `unit` the unit of positions, each empty if it is not
+    /// to be stated.
     #[wasm_bindgen(js_name = toBytes)]
-    pub fn to_bytes(&self, format: &str, is_recentred: bool, notes: &str) -> Result<Vec<u8>, JsValue> {
+    pub fn to_bytes(
+        &self,
+        format: &str,
+        is_recentred: bool,
+        notes: &str,
+        space: &str,
+        written_as: &str,
+        unit: &str,
+    ) -> Result<Vec<u8>, JsValue> {
         let format = MeshFormat::from_extension(format)
             .ok_or_else(|| Failure::invalid("format", "must be one of glb, ply, stl, obj, vtp, mz3"))?;
         let mut mesh = self.with_normals();
         if is_recentred && mesh.origin != DVec3::ZERO {
             Rc::make_mut(&mut mesh).origin = DVec3::ZERO;
         }
-        Ok(write_noted_mesh(&mesh, format, notes).map_err(Failure::from)?)
+        Ok(write_mesh_with(&mesh, format, &write_options(notes, [space, written_as, unit]))
+            .map_err(Failure::from)?)
     }
 
     /// Returns an independent copy; that of a live mesh no longer changes with its model.

@@ -3,15 +3,13 @@
 use js_sys::Uint8Array;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, in_world, packed};
+use super::convert::{bytes, in_world, packed, to_js};
 use super::error::Failure;
 use super::texture::RawTexture;
 use std::borrow::Cow;
 use vesicle::io::{
-    FileSet, FormatError, PointCloud, VolumeOptions, parse_mesh, parse_points, parse_textured_mesh,
-    parse_volume_with,
+    FileSet, FormatError, MeshFile, MeshOptions, PointCloud, VolumeOptions, parse_points, parse_volume_with,
 };
-use vesicle::mesh::TriangleMesh;
 use vesicle::volume::{Space, Volume};
 
 /// Reads a volume from the bytes of a file. If the header is in a file of its own, `data` is the content of the data
@@ -55,13 +53,32 @@ impl FileSet for FilesOfPage {
     }
 }
 
-/// Reads a mesh from the bytes of a file in any supported format, with a texture from a separate image if one is given.
-pub(super) fn read_mesh(file: &Uint8Array, texture: Option<RawTexture>) -> Result<TriangleMesh, Failure> {
-    let file = bytes(file)?;
-    Ok(match texture {
-        Some(texture) => parse_textured_mesh(&file, texture.0),
-        None => parse_mesh(&file),
-    }?)
+/// Reads a mesh from the bytes of a file in any supported format, with a texture from a separate image if one is given,
+/// and the files beside it.
+pub(super) fn read_mesh(
+    file: &Uint8Array,
+    texture: Option<RawTexture>,
+    files: Vec<NamedFile>,
+) -> Result<MeshFile, Failure> {
+    let files: Vec<(&str, &[u8])> = files.iter().map(|file| (file.name.as_str(), &file.bytes[..])).collect();
+    let options = MeshOptions { texture: texture.map(|texture| texture.0), files: &files };
+    Ok(vesicle::io::read_mesh(&bytes(file)?, options)?)
+}
+
+/// A file beside another one, copied.
+#[wasm_bindgen]
+pub struct NamedFile {
+    name: String,
+    bytes: Vec<u8>,
+}
+
+#[wasm_bindgen]
+impl NamedFile {
+    /// Copies the name and the bytes of a file.
+    #[wasm_bindgen(constructor)]
+    pub fn new(name: String, file: &Uint8Array) -> Result<NamedFile, JsValue> {
+        Ok(NamedFile { name, bytes: bytes(file)? })
+    }
 }
 
 /// The raw handle of a point cloud that was read from a file.
@@ -88,5 +105,10 @@ impl RawPoints {
     /// Returns the colours as red, green and blue of each point in turn, in 0..1, if the file has them.
     pub fn colors(&self) -> Option<Vec<f32>> {
         self.0.colors.as_deref().map(packed)
+    }
+
+    /// Returns what a user should know about the points, as an array of `Warning`.
+    pub fn warnings(&self) -> Result<JsValue, JsValue> {
+        Ok(to_js(&self.0.warnings)?)
     }
 }

@@ -7,7 +7,7 @@ use js_sys::Float64Array;
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{doubles, to_js, with_overrides};
+use super::convert::{doubles, to_js, with_overrides, write_options};
 use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method::{method_bindings, shared};
@@ -109,11 +109,18 @@ impl RawTracker {
     }
 
     /// Returns the surfaces of the finished frames as the bytes of an animated GLB in which each lasts `frame_seconds`. Each
-    /// line of `notes` for the reader of the file is `code: text`.
+    /// line of `notes` for the reader of the file is `code: text`. `space` is that of the surfaces, `written_as` that in the
+    /// file, and `unit` the unit of positions, each empty if it is not to be stated.
     #[wasm_bindgen(js_name = toGlb)]
-    pub fn to_glb(&self, frame_seconds: f64, notes: &str) -> Result<Vec<u8>, JsValue> {
-        let mut animation = AnimationWriter::default();
-        animation.note(notes);
+    pub fn to_glb(
+        &self,
+        frame_seconds: f64,
+        notes: &str,
+        space: &str,
+        written_as: &str,
+        unit: &str,
+    ) -> Result<Vec<u8>, JsValue> {
+        let mut animation = AnimationWriter::new(&write_options(notes, [space, written_as, unit]));
         let tracker = self.0.borrow();
         tracker.meshes().iter().try_for_each(|mesh| animation.add(mesh)).map_err(Failure::from)?;
         Ok(animation.finish(frame_seconds).map_err(Failure::from)?)

@@ -3,6 +3,8 @@
 //! Meshes of different connectivity cannot be morphed into one another. Each mesh is therefore a node of its own, whose
 //! scale is 1 during its frames and 0 before and after. A viewer that plays no animations shows the first mesh.
 
+use super::WriteOptions;
+use super::frame::half_turn;
 use super::glb_writer::{DocumentBuilder, json_array_member, translation};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
@@ -37,6 +39,8 @@ pub fn write_animation<M: Borrow<TriangleMesh>>(
 #[derive(Default)]
 pub struct AnimationWriter {
     parts: DocumentBuilder,
+    /// Whether meshes are rotated by 180° about z.
+    turns: bool,
     /// For each mesh stored in the file, the index of the first animation frame that shows it, and of the first after
     /// that which does not.
     shown: Vec<[usize; 2]>,
@@ -47,9 +51,10 @@ pub struct AnimationWriter {
 }
 
 impl AnimationWriter {
-    /// Sets notes for the reader of the file, as [`write_noted_mesh`](super::write_noted_mesh) writes them.
-    pub fn note(&mut self, notes: &str) {
-        self.parts.notes = String::from(notes);
+    /// Creates an animation without frames, with what is to be stated in it as
+    /// [`write_mesh_with`](super::write_mesh_with) does.
+    pub fn new(options: &WriteOptions) -> Self {
+        Self { parts: DocumentBuilder::new(options), turns: options.turns(), ..Self::default() }
     }
 
     /// Appends a frame that shows `mesh`.
@@ -64,9 +69,11 @@ impl AnimationWriter {
         } else if self.last.as_ref() == Some(mesh) {
             self.shown.iter_mut().last().into_iter().for_each(|[_, end]| *end = frame + 1);
         } else {
-            self.parts.mesh(mesh)?;
+            let turned = self.turns.then(|| half_turn(mesh.clone()));
+            let stored = turned.as_ref().unwrap_or(mesh);
+            self.parts.mesh(stored)?;
             self.shown.push([frame, frame + 1]);
-            self.origins.push(mesh.origin);
+            self.origins.push(stored.origin);
             self.last = Some(mesh.clone());
         }
         self.frames += 1;

@@ -52,6 +52,16 @@ pub enum FormatError {
 }
 
 impl FormatError {
+    /// Returns the same error about another format, of which the first is a kind.
+    pub(crate) fn of_format(mut self, name: &'static str) -> Self {
+        let (Self::Invalid { format, .. }
+        | Self::Unsupported { format, .. }
+        | Self::Truncated { format, .. }
+        | Self::TooLarge { format, .. }) = &mut self;
+        *format = name;
+        self
+    }
+
     /// Returns an [`Invalid`](Self::Invalid) error about positions that single precision cannot show.
     pub(crate) fn positions(format: &'static str, error: &MeshError) -> Self {
         Self::invalid(format, "positions", error.to_string())

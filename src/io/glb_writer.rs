@@ -1,5 +1,7 @@
 //! Writer of GLB (binary glTF): meshes and images become ranges of one buffer, described by the JSON.
 
+use super::WriteOptions;
+use super::frame::Frame;
 use super::glb::container;
 use super::mesh_file::push_floats;
 use super::notes::extras;
@@ -13,12 +15,13 @@ const VERTICES: Option<u32> = Some(34962);
 const INDICES: Option<u32> = Some(34963);
 
 /// Returns the bytes of a GLB file of one mesh, as one node with one primitive: positions, normals (computed if the
-/// mesh has none), and the other attributes that the mesh has. Without triangles, the scene has one empty node.
+/// mesh has none), and the other attributes that the mesh has. Without triangles, the scene has one empty node. If the
+/// space or the unit is known, the node is the child of one that maps it to glTF's space.
 ///
 /// # Errors
 /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
-pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Result<Vec<u8>, MeshError> {
-    let mut parts = DocumentBuilder { notes: String::from(notes), ..DocumentBuilder::default() };
+pub(super) fn write(mesh: &TriangleMesh, options: &WriteOptions) -> Result<Vec<u8>, MeshError> {
+    let mut parts = DocumentBuilder::new(options);
     let node = if mesh.triangles.is_empty() {
         String::from("{}")
     } else {
@@ -47,10 +50,17 @@ pub(super) struct DocumentBuilder {
     textures: Vec<Arc<Texture>>,
     images: Vec<String>,
     /// Notes for the reader of the file, in `extras` of the asset.
-    pub(super) notes: String,
+    notes: String,
+    /// The frame of the nodes, which a root node maps to glTF's space.
+    frame: Frame,
 }
 
 impl DocumentBuilder {
+    /// Creates a document without content, which states what the options say.
+    pub(super) fn new(options: &WriteOptions) -> Self {
+        Self { notes: options.notes.into(), frame: options.frame(), ..Self::default() }
+    }
+
     /// Adds a mesh with its texture and returns its index in the document.
     ///
     /// # Errors
@@ -179,8 +189,8 @@ impl DocumentBuilder {
         if fits { Ok(()) } else { Err(MeshError::TooLarge { bytes }) }
     }
 
-    /// Returns the bytes of the GLB file, with all nodes as roots of one scene; `extra_json` holds further members of
-    /// the JSON document, each preceded by a comma.
+    /// Returns the bytes of the GLB file, with all nodes as roots of one scene, or as children of the only root if it has to
+    /// map them to glTF's space; `extra_json` holds further members of the JSON document, each preceded by a comma.
     ///
     /// # Errors
     /// [`MeshError::TooLarge`] if the file would exceed 4 GiB or there is not enough memory for it.
@@ -188,7 +198,12 @@ impl DocumentBuilder {
         let asset = format!(r#"{{"version":"2.0","generator":"vesicle"{}}}"#, extras(&self.notes));
         let mut json = format!(r#"{{"asset":{asset},"scene":0"#);
         let nodes: Vec<String> = (0..self.nodes.len()).map(|node| node.to_string()).collect();
-        json += &format!(r#","scenes":[{{"nodes":[{}]}}]"#, nodes.join(","));
+        let mut roots = nodes.join(",");
+        if let Some(root) = self.frame.root(&roots) {
+            roots = self.nodes.len().to_string();
+            self.nodes.push(root);
+        }
+        json += &format!(r#","scenes":[{{"nodes":[{roots}]}}]"#);
         json += extra_json;
         json += &self.materials_json();
         let buffers = [format!(r#"{{"byteLength":{}}}"#, self.bytes.len())];

@@ -1,8 +1,7 @@
 //! The base colour texture of a glTF primitive: its image and its texture transform.
 
-use super::glb::FORMAT;
+use super::FormatError;
 use super::gltf::{Document, numbers, required, unsigned};
-use super::{FormatError, base64};
 use crate::math::Vec2;
 use crate::mesh::Texture;
 use serde_json::Value;
@@ -47,23 +46,29 @@ impl<'a> BaseColor<'a> {
         self.transform.as_ref().map_or(uv, |transform| transform.of(uv))
     }
 
-    /// Returns the texture's image; `None` if it is in a separate file or its encoding is not PNG, JPEG or WebP.
+    /// Returns the texture's image. Without one: the name of the file that it is in, if that is not there; nothing if its
+    /// encoding is not PNG, JPEG or WebP.
     ///
     /// # Errors
-    /// An index or range out of bounds, a buffer view outside the binary chunk or compressed, or a data URI that cannot
-    /// be decoded.
-    pub(super) fn texture(&self, document: &Document<'a>) -> Result<Option<Texture>, FormatError> {
+    /// An index or range out of bounds, a buffer view without data or compressed, or a data URI that cannot be decoded.
+    pub(super) fn texture(
+        &self,
+        document: &Document<'a>,
+    ) -> Result<Result<Texture, Option<String>>, FormatError> {
         let webp = &self.texture["extensions"]["EXT_texture_webp"];
         let Some(source) = unsigned(self.texture, "source")?.or(unsigned(webp, "source")?) else {
-            return Ok(None);
+            return Ok(Err(None));
         };
         let image = document.entry("images", source)?;
         let bytes = match (unsigned(image, "bufferView")?, image["uri"].as_str()) {
             (Some(view), _) => document.view(view)?.bytes.to_vec(),
-            (None, Some(address)) if address.starts_with("data:") => decode_data_uri(address, source)?,
-            _ => return Ok(None),
+            (None, Some(uri)) => match document.buffers.resource(uri, &format!("images[{source}]"))? {
+                Ok(bytes) => bytes,
+                Err(name) => return Ok(Err(Some(name))),
+            },
+            _ => return Ok(Err(None)),
         };
-        Ok(Texture::new(bytes).ok())
+        Ok(Texture::new(bytes).map_err(|_| None))
     }
 }
 
@@ -88,12 +93,4 @@ impl TextureTransform {
         let turned = [cosine * u + sine * v, cosine * v - sine * u];
         Vec2::new((turned[0] + self.offset[0]) as f32, (turned[1] + self.offset[1]) as f32)
     }
-}
-
-/// Returns the bytes of a base64 data URI.
-fn decode_data_uri(address: &str, image: u64) -> Result<Vec<u8>, FormatError> {
-    let coded = address.split_once(',').filter(|(head, _)| head.ends_with(";base64"));
-    coded.and_then(|(_, text)| base64::decode(text)).ok_or_else(|| {
-        FormatError::invalid(FORMAT, format!("images[{image}].uri"), "must be a base64 data URI")
-    })
 }

@@ -1,7 +1,12 @@
 //! Reading and writing of mesh files: detection of the format, and checks common to all formats.
 
-use super::{FormatError, glb, glb_writer, mz3, obj, ply, stl, vtp};
+use super::frame::half_turn;
+use super::points::full_channel;
+use super::text::without_byte_order_mark;
+use super::{FormatError, WriteOptions, glb, glb_writer, mz3, obj, ply, stl, vtp};
 use crate::mesh::{MeshError, Texture, TriangleMesh};
+use crate::volume::{LengthUnit, Space};
+use crate::warning::{Warning, WarningCode};
 use std::sync::Arc;
 
 /// A file format in which meshes can be written.
@@ -50,12 +55,52 @@ impl MeshFormat {
     }
 }
 
-/// Reads the mesh in a GLB, PLY, STL or OBJ file, whose format is detected from its content.
+/// The content of a mesh file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeshFile {
+    /// The mesh, with positions in the file's units and space.
+    pub mesh: TriangleMesh,
+    /// The directions of the axes, if the file states them: `SPACE=RAS` or `SPACE=LPS` in a comment, as 3D Slicer writes
+    /// it, or the root node of a GLB that [`write_mesh_with`] wrote.
+    pub space: Option<Space>,
+    /// The length of a unit of positions, if the file states it, as such a GLB does.
+    pub unit: LengthUnit,
+    /// Warnings about the mesh: parts that were left out, and assumptions.
+    pub warnings: Vec<Warning>,
+}
+
+impl MeshFile {
+    /// Adds a warning of the reader.
+    pub(super) fn warn(&mut self, text: impl Into<String>) {
+        self.warnings.push(Warning::new(WarningCode::Reader, text));
+    }
+}
+
+impl From<TriangleMesh> for MeshFile {
+    fn from(mesh: TriangleMesh) -> Self {
+        Self { mesh, ..Self::default() }
+    }
+}
+
+/// Inputs for reading a mesh file besides its bytes.
+#[derive(Clone, Debug, Default)]
+pub struct MeshOptions<'a> {
+    /// A texture from a separate file (OBJ, PLY); in a GLB it replaces the file's own. As for every mesh with a texture,
+    /// v then points down: v of an OBJ or PLY becomes 1 − v.
+    pub texture: Option<Arc<Texture>>,
+    /// The names and bytes of the files beside it, for the buffers and images that a glTF document refers to. A name may
+    /// have folders; only its end has to agree.
+    pub files: &'a [(&'a str, &'a [u8])],
+}
+
+/// Reads the mesh in a GLB, PLY, STL or OBJ file, or in a glTF document whose buffers are in data URIs; the format is
+/// detected from the content.
 ///
 /// Vertices with equal positions are merged ([`TriangleMesh::welded`]), and triangles that then have two equal corners
-/// are dropped. Polygons become triangle fans, positions are in the file's own units, and texture coordinates are kept
-/// as in the file (v points down in glTF, up in OBJ and PLY). If all triangles of a GLB have texture coordinates, an
-/// embedded texture is read as well: the base colour image of the first triangles that have one, with coordinates
+/// are dropped. Polygons become triangles: a fan where that covers the polygon, else by ear clipping as seen along their
+/// mean normal ([`triangulate_face`](crate::math::triangulate_face)). Positions are in the file's own units, and texture
+/// coordinates are kept as in the file (v points down in glTF, up in OBJ and PLY). If all triangles of a GLB have texture
+/// coordinates, a texture is read as well: the base colour image of the first triangles that have one, with coordinates
 /// transformed by `KHR_texture_transform`. Memory is linear in the size of the file, except that nodes of a GLB may
 /// repeat a mesh, up to 25 million triangle corners in total.
 ///
@@ -64,62 +109,101 @@ impl MeshFormat {
 /// contradictory, too large or use an unsupported feature, for positions that are not finite, and for files without
 /// triangles.
 pub fn parse_mesh(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
-    Ok(parse_welded(bytes)?.1)
+    Ok(read_mesh(bytes, MeshOptions::default())?.mesh)
 }
 
-/// Reads a mesh as [`parse_mesh`] does, with a texture from a separate file (OBJ, PLY); in a GLB it replaces the file's
-/// own. As for every mesh with a texture, v points down: v of an OBJ or PLY becomes 1 − v.
+/// Reads a mesh as [`parse_mesh`] does, with a texture from a separate file; see [`MeshOptions::texture`].
 ///
 /// # Errors
 /// As [`parse_mesh`], and for files without texture coordinates.
 pub fn parse_textured_mesh(bytes: &[u8], texture: Arc<Texture>) -> Result<TriangleMesh, FormatError> {
-    let (format, mut mesh) = parse_welded(bytes)?;
-    if !mesh.has_uvs() {
+    Ok(read_mesh(bytes, MeshOptions { texture: Some(texture), ..MeshOptions::default() })?.mesh)
+}
+
+/// Reads a mesh as [`parse_mesh`] does, and what else its file states.
+///
+/// # Errors
+/// As [`parse_mesh`]; for a texture and a file without texture coordinates; for a glTF document that refers to a buffer
+/// in a file that is not among those beside it, which the error names.
+pub fn read_mesh(bytes: &[u8], options: MeshOptions) -> Result<MeshFile, FormatError> {
+    let (format, mut file) = parse_welded(bytes, options.files)?;
+    let Some(texture) = options.texture else { return Ok(file) };
+    if !file.mesh.has_uvs() {
         let problem = "missing; a texture needs them for every triangle";
         return Err(FormatError::invalid(format, "texture coordinates", problem));
     }
-    if format != glb::FORMAT {
-        mesh.flip_v();
+    if ![glb::FORMAT, glb::TEXT_FORMAT].contains(&format) {
+        file.mesh.flip_v();
     }
-    mesh.texture = Some(texture);
-    Ok(mesh)
+    file.mesh.texture = Some(texture);
+    Ok(file)
 }
 
 /// Reads a mesh file, checks the mesh and merges vertices of equal position; returns the name of the format and the
-/// mesh. An error if no triangle with three distinct corners is left.
-fn parse_welded(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
-    let (format, mesh) = parse(bytes)?;
-    mesh.validate().map_err(|error| match error {
+/// content. An error if no triangle with three distinct corners is left.
+fn parse_welded(bytes: &[u8], files: &[(&str, &[u8])]) -> Result<(&'static str, MeshFile), FormatError> {
+    let (format, mut file) = parse(bytes, files)?;
+    file.mesh.validate().map_err(|error| match error {
         MeshError::InvalidArgument { parameter, problem } => FormatError::invalid(format, parameter, problem),
         other => FormatError::invalid(format, "mesh", other.to_string()),
     })?;
-    let welded = mesh.welded();
-    if welded.triangles.is_empty() {
-        return Err(FormatError::invalid(
-            format,
-            "faces",
-            "the file has no triangles with three distinct corners",
-        ));
+    file.mesh = file.mesh.welded();
+    if file.mesh.triangles.is_empty() {
+        let problem = "the file has no triangles with three distinct corners";
+        return Err(FormatError::invalid(format, "faces", problem));
     }
-    Ok((format, welded))
+    drop_broken_attributes(&mut file);
+    if let Some(colors) = &mut file.mesh.colors
+        && let Some(full) = full_channel(colors.iter().copied())
+    {
+        colors.iter_mut().for_each(|color| *color /= full);
+    }
+    Ok((format, file))
 }
 
-/// Reads a mesh file in the format that its first bytes indicate; returns the name of the format and the mesh.
-fn parse(bytes: &[u8]) -> Result<(&'static str, TriangleMesh), FormatError> {
+/// Removes texture coordinates and colours that are not finite, with a warning. Normals that aren't are 0 by now.
+fn drop_broken_attributes(file: &mut MeshFile) {
+    let mesh = &mut file.mesh;
+    let broken_uvs = mesh.uvs.iter().flatten().any(|uv| !uv.is_finite())
+        || mesh.corner_uvs.iter().flatten().flatten().any(|uv| !uv.is_finite());
+    let broken_colors = mesh.colors.iter().flatten().any(|color| !color.is_finite());
+    if broken_uvs {
+        (mesh.uvs, mesh.corner_uvs, mesh.texture) = (None, None, None);
+    }
+    if broken_colors {
+        mesh.colors = None;
+    }
+    for (is_broken, name) in [(broken_uvs, "texture coordinates"), (broken_colors, "colours")] {
+        if is_broken {
+            file.warn(format!("Some {name} are not finite numbers: all were left out."));
+        }
+    }
+}
+
+/// Reads a mesh file in the format that its first bytes indicate; returns the name of the format and the content.
+fn parse(bytes: &[u8], files: &[(&str, &[u8])]) -> Result<(&'static str, MeshFile), FormatError> {
     if bytes.starts_with(b"glTF") {
-        return Ok(("GLB", glb::parse(bytes)?));
+        return Ok((glb::FORMAT, glb::parse(bytes, files)?));
     }
-    if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
-        return Ok(("PLY", ply::parse(bytes)?));
+    if stl::is_binary(bytes) && !ply::is_ply(bytes) {
+        return Ok((stl::FORMAT, stl::parse_binary(bytes)?));
     }
-    if stl::is_binary(bytes) {
-        return Ok(("STL", stl::parse_binary(bytes)?));
+    let text = without_byte_order_mark(bytes);
+    let bytes = text.as_deref().unwrap_or(bytes);
+    if ply::is_ply(bytes) {
+        return Ok((ply::FORMAT, ply::parse(bytes)?));
+    }
+    if glb::is_text(bytes) {
+        return Ok((glb::TEXT_FORMAT, glb::parse_text(bytes, files)?));
     }
     if stl::is_text_stl(bytes) {
-        return Ok(("STL", stl::parse_text(bytes)?));
+        return Ok((stl::FORMAT, stl::parse_text(bytes)?));
     }
     if obj::is_obj(bytes) {
-        return Ok(("OBJ", obj::parse(bytes)?));
+        return Ok((obj::FORMAT, obj::parse(bytes)?));
+    }
+    if !is_text(bytes) && stl::resembles_binary(bytes) {
+        return Ok((stl::FORMAT, stl::parse_binary(bytes)?));
     }
     Err(unsupported_format(bytes))
 }
@@ -132,20 +216,38 @@ pub(super) fn is_text(bytes: &[u8]) -> bool {
 
 /// Returns the error for the bytes of a file in no accepted mesh format; it names the format if it is recognised.
 fn unsupported_format(bytes: &[u8]) -> FormatError {
-    const ACCEPTED: &str = "GLB, PLY, STL and OBJ";
-    let unsupported = |found: &str| FormatError::unsupported("mesh file", "format", found, ACCEPTED);
-    let text = is_text(bytes);
-    match bytes {
-        [] => FormatError::truncated("mesh file", "content", 1, 0),
-        [0x1f, 0x8b, ..] => unsupported("gzip"),
-        [b'{', ..] => unsupported("JSON text (glTF must be the binary kind)"),
-        [b'M', b'Z', ..] => unsupported("MZ3"),
-        _ if bytes.starts_with(b"<?xml") || bytes.starts_with(b"<VTKFile") => unsupported("XML"),
-        // STL has no signature: other bytes long enough for its header can only be a broken STL.
-        _ if !text && bytes.len() >= stl::HEADER => stl::wrong_length(bytes),
-        _ if text => unsupported("text without vertices or facets"),
-        _ => unsupported("an unknown binary format"),
+    const ACCEPTED: &str = "GLB, glTF, PLY, STL and OBJ";
+    if bytes.is_empty() {
+        return FormatError::truncated("mesh file", "content", 1, 0);
     }
+    let unknown = if is_text(bytes) { "text without vertices or facets" } else { "an unknown binary format" };
+    FormatError::unsupported("mesh file", "format", known_format(bytes).unwrap_or(unknown), ACCEPTED)
+}
+
+/// Returns the name of a format that is not read, by the first bytes of a file; `None` if they are of no known one.
+pub(super) fn known_format(bytes: &[u8]) -> Option<&'static str> {
+    let bytes = bytes.trim_ascii_start();
+    const MARKS: [(&[u8], &str); 18] = [
+        (b"\x1f\x8b", "gzip"),
+        (b"PK\x03\x04", "zip, which 3MF and USDZ are (unpack it first)"),
+        (b"MZ", "MZ3"),
+        (b"<!DOCTYPE html", "HTML, a web page in place of the file"),
+        (b"<!doctype html", "HTML, a web page in place of the file"),
+        (b"<html", "HTML, a web page in place of the file"),
+        (b"<HTML", "HTML, a web page in place of the file"),
+        (b"<?xml", "XML"),
+        (b"<VTKFile", "XML"),
+        (b"# vtk", "VTK legacy"),
+        (b"# .PCD", "PCD"),
+        (b"OFF", "OFF"),
+        (b"COFF", "OFF"),
+        (b"NOFF", "OFF"),
+        (b"LASF", "LAS"),
+        (b"Kaydara FBX", "FBX"),
+        (b"BLENDER", "a Blender document"),
+        (b"%PDF", "PDF"),
+    ];
+    MARKS.iter().find(|(mark, _)| bytes.starts_with(mark)).map(|&(_, name)| name)
 }
 
 /// Returns the bytes of a file with the mesh and those of its attributes that the format supports. Attributes are
@@ -163,30 +265,41 @@ fn unsupported_format(bytes: &[u8]) -> FormatError {
 /// single precision only, where that is too coarse for the mesh; [`MeshError::TooLarge`] if the file might exceed 4 GiB,
 /// by a bound for all formats of 64 bytes per vertex and 160 per triangle, or if there is not enough memory for a GLB.
 pub fn write_mesh(mesh: &TriangleMesh, format: MeshFormat) -> Result<Vec<u8>, MeshError> {
-    write_noted_mesh(mesh, format, "")
+    write_mesh_with(mesh, format, &WriteOptions::default())
 }
 
-/// Returns the bytes of a file as [`write_mesh`] does, with notes for the reader of the file, which programs ignore: comment
-/// lines in PLY, OBJ and VTP, `extras.warnings` of the asset in GLB, as much as fits of the header of STL; MZ3 has no
-/// room for any. Each line of `notes` is one, `code: text`, of which STL has only the code.
+/// Returns the bytes of a file as [`write_mesh`] does, with what else is to be stated in it.
+///
+/// The space is stated as 3D Slicer reads it, which takes files without for LPS: `SPACE=RAS` or `SPACE=LPS` in the header
+/// of STL, in a comment of PLY and OBJ, in field data of VTP. In GLB, a root node maps positions to metres and y upwards,
+/// and its `extras` are `space` and `unit`; [`read_mesh`] gives back positions as they were. MZ3 states nothing.
+///
+/// Notes are comment lines in PLY, OBJ and VTP, `extras.warnings` of the asset in GLB, as much as fits of the header of
+/// STL, which has only their codes; MZ3 has no room for any.
 ///
 /// # Errors
 /// As [`write_mesh`].
-pub fn write_noted_mesh(mesh: &TriangleMesh, format: MeshFormat, notes: &str) -> Result<Vec<u8>, MeshError> {
+pub fn write_mesh_with(
+    mesh: &TriangleMesh,
+    format: MeshFormat,
+    options: &WriteOptions,
+) -> Result<Vec<u8>, MeshError> {
     mesh.validate()?;
     check_size(mesh)?;
-    let turned = (mesh.texture.is_some() && format.has_v_upwards()).then(|| {
+    let turned = options.turns().then(|| half_turn(mesh.clone()));
+    let mesh = turned.as_ref().unwrap_or(mesh);
+    let flipped = (mesh.texture.is_some() && format.has_v_upwards()).then(|| {
         let mut mesh = mesh.clone();
         mesh.flip_v();
         mesh
     });
-    let mesh = turned.as_ref().unwrap_or(mesh);
+    let mesh = flipped.as_ref().unwrap_or(mesh);
     Ok(match format {
-        MeshFormat::Glb => glb_writer::write(mesh, notes)?,
-        MeshFormat::Ply => ply::write(mesh, notes),
-        MeshFormat::Stl => stl::write(mesh, notes)?,
-        MeshFormat::Obj => obj::write(mesh, notes),
-        MeshFormat::Vtp => vtp::write(mesh, notes),
+        MeshFormat::Glb => glb_writer::write(mesh, options)?,
+        MeshFormat::Ply => ply::write(mesh, options),
+        MeshFormat::Stl => stl::write(mesh, options)?,
+        MeshFormat::Obj => obj::write(mesh, options),
+        MeshFormat::Vtp => vtp::write(mesh, options),
         MeshFormat::Mz3 => mz3::write(mesh)?,
     })
 }

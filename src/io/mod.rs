@@ -7,10 +7,16 @@ mod colour;
 mod deflate;
 mod detect;
 mod error;
+mod faces;
+mod frame;
 mod glb;
 mod glb_writer;
 mod gltf;
+mod gltf_accessor;
+mod gltf_buffer;
 mod gltf_material;
+mod gltf_scene;
+mod gltf_skin;
 mod gzip;
 mod mesh_file;
 mod metaimage;
@@ -36,7 +42,11 @@ pub use animation::{AnimationWriter, write_animation};
 pub use beside::FileSet;
 pub use detect::{parse_volume, parse_volume_with};
 pub use error::FormatError;
-pub use mesh_file::{MeshFormat, parse_mesh, parse_textured_mesh, write_mesh, write_noted_mesh};
+pub use frame::WriteOptions;
+pub use mesh_file::{
+    MeshFile, MeshFormat, MeshOptions, parse_mesh, parse_textured_mesh, read_mesh, write_mesh,
+    write_mesh_with,
+};
 pub use nifti_writer::write_nifti;
 pub use points::{PointCloud, parse_points};
 pub use source::VolumeOptions;

@@ -2,6 +2,17 @@
 //!
 //! All is done character by character, as searching in strings would be most of what this adds to a module.
 
+use crate::volume::Space;
+
+/// Returns the space that a header or comment of a mesh file states in the way of 3D Slicer, if it does.
+pub(super) fn stated_space(text: &[u8]) -> Option<Space> {
+    let says = |mark: &[u8]| text.windows(mark.len()).any(|part| part == mark);
+    if says(b"SPACE=RAS") {
+        return Some(Space::Ras);
+    }
+    says(b"SPACE=LPS").then_some(Space::Lps)
+}
+
 /// Returns a comment for each note, between `start` and `end`: in ASCII, which is all that some readers accept there,
 /// without control characters, and without two hyphens in a row, which would end one of XML.
 pub(super) fn comments(notes: &str, start: &str, end: &str) -> String {
@@ -91,7 +102,7 @@ fn ascii(c: char) -> char {
 
 #[cfg(test)]
 mod tests {
-    use crate::io::{AnimationWriter, MeshFormat, parse_mesh, write_mesh, write_noted_mesh};
+    use crate::io::{AnimationWriter, MeshFormat, WriteOptions, parse_mesh, write_mesh, write_mesh_with};
     use crate::math::Vec3;
     use crate::mesh::{Mesh, TriangleMesh};
     #[cfg(target_arch = "wasm32")]
@@ -99,6 +110,10 @@ mod tests {
 
     fn ball() -> TriangleMesh {
         Mesh::icosphere(Vec3::ZERO, 1.0, 0.8).unwrap().to_triangles()
+    }
+
+    fn write_noted(mesh: &TriangleMesh, format: MeshFormat, notes: &str) -> Vec<u8> {
+        write_mesh_with(mesh, format, &WriteOptions { notes, ..WriteOptions::default() }).unwrap()
     }
 
     const NOTES: &str = "anisotropic: 1×1×6 mm³;\t the \"shape\" -- is\\a guess\nends-in-frame: Frame 3.";
@@ -111,7 +126,7 @@ mod tests {
     fn files_with_notes_are_read_as_without_them() {
         let mesh = ball();
         for format in [MeshFormat::Glb, MeshFormat::Ply, MeshFormat::Stl, MeshFormat::Obj] {
-            let [plain, noted] = ["", NOTES].map(|notes| write_noted_mesh(&mesh, format, notes).unwrap());
+            let [plain, noted] = ["", NOTES].map(|notes| write_noted(&mesh, format, notes));
             assert_eq!(plain, write_mesh(&mesh, format).unwrap());
             assert_ne!(plain, noted);
             assert_eq!(parse_mesh(&noted).unwrap(), parse_mesh(&plain).unwrap(), "{format:?}");
@@ -123,7 +138,7 @@ mod tests {
         let mesh = ball();
         let text = r#"warning anisotropic: 1x1x6 mm3;  the "shape" - - is\a guess"#;
         let [ply, obj, vtp, mz3] = [MeshFormat::Ply, MeshFormat::Obj, MeshFormat::Vtp, MeshFormat::Mz3]
-            .map(|format| write_noted_mesh(&mesh, format, NOTES).unwrap());
+            .map(|format| write_noted(&mesh, format, NOTES));
         assert!(contains(&ply, &format!("\ncomment {text}\n")));
         assert!(contains(&obj, &format!("# {text}\n# warning ends-in-frame")));
         assert!(contains(&vtp, &format!("<!-- {} -->\n", text)));
@@ -134,7 +149,7 @@ mod tests {
     #[test]
     fn the_header_of_an_stl_has_as_many_codes_as_fit() {
         let many = [NOTES; 5].join("\n");
-        let stl = write_noted_mesh(&ball(), MeshFormat::Stl, &many).unwrap();
+        let stl = write_noted(&ball(), MeshFormat::Stl, &many);
         let header = "binary STL, warnings: anisotropic ends-in-frame anisotropic ends-in-frame ";
         assert!(stl.starts_with(header.as_bytes()), "{:?}", String::from_utf8_lossy(&stl[..80]));
         assert_eq!(stl[header.len()..80], b"      "[..80 - header.len()]);
@@ -144,7 +159,7 @@ mod tests {
     fn the_header_of_an_stl_says_by_what_a_surface_was_moved() {
         let point = "(point 512345.625 5401234.5 123.5)";
         let notes = format!("recentred: Moved towards the origin. {point}\n{NOTES} (frame 3)");
-        let stl = write_noted_mesh(&ball(), MeshFormat::Stl, &notes).unwrap();
+        let stl = write_noted(&ball(), MeshFormat::Stl, &notes);
         let header = format!("binary STL, warnings: recentred {point} anisotropic ");
         assert!(stl.starts_with(header.as_bytes()), "{:?}", String::from_utf8_lossy(&stl[..80]));
     }
@@ -152,12 +167,10 @@ mod tests {
     #[test]
     fn a_glb_has_notes_in_the_extras_of_its_asset() {
         let mesh = ball();
-        let mut animation = AnimationWriter::default();
-        animation.note(NOTES);
+        let mut animation = AnimationWriter::new(&WriteOptions { notes: NOTES, ..WriteOptions::default() });
         animation.add(&mesh).unwrap();
         let extras = r#""extras":{"warnings":["anisotropic: 1×1×6 mm³;  the \"shape\" -- is\\a guess","ends-in-frame: Frame 3."]}"#;
-        for glb in [write_noted_mesh(&mesh, MeshFormat::Glb, NOTES).unwrap(), animation.finish(0.1).unwrap()]
-        {
+        for glb in [write_noted(&mesh, MeshFormat::Glb, NOTES), animation.finish(0.1).unwrap()] {
             assert!(contains(&glb, extras));
         }
     }

@@ -1,15 +1,20 @@
 //! Reader and writer of Wavefront OBJ: vertices, texture coordinates, normals and faces. Everything else is ignored.
 
+use super::faces::Faces;
 use super::mesh_file::is_text;
-use super::notes::comments;
-use super::text::numbered_lines;
-use super::{FormatError, PointCloud};
+use super::notes::{comments, stated_space};
+use super::text::{number, numbered_lines};
+use super::{FormatError, MeshFile, PointCloud, WriteOptions};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::mesh::{TriangleMesh, WorldPositions};
+use crate::volume::Space;
 use std::fmt::{Display, Write};
 use std::mem;
 
 pub(super) const FORMAT: &str = "OBJ";
+
+/// Index of the texture coordinates or the normal of a corner that has none.
+const NONE: u32 = u32::MAX;
 
 /// Returns whether the bytes are text with at least one vertex line.
 pub(super) fn is_obj(bytes: &[u8]) -> bool {
@@ -23,7 +28,7 @@ fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 /// Reads a mesh from an OBJ file. Texture coordinates and normals are kept if every corner of every face has them,
 /// colours if every vertex has one; the normals at the corners are averaged per vertex.
-pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+pub(super) fn parse(bytes: &[u8]) -> Result<MeshFile, FormatError> {
     read(bytes)?.into_mesh()
 }
 
@@ -34,13 +39,13 @@ pub(super) fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     read(bytes)?.into_points()
 }
 
-/// Reads all lines of an OBJ file; a backslash at the end of a line joins the next one to it.
+/// Reads all lines of an OBJ file; a backslash at the end of a line joins the next one to it, unless it ends a comment.
 fn read(bytes: &[u8]) -> Result<Reader, FormatError> {
     let mut reader = Reader::default();
-    let mut continued = Vec::new();
+    let (mut continued, mut last) = (Vec::new(), 0);
     for (number, line) in numbered_lines(bytes) {
-        // A backslash at the end joins the next line to this one.
-        if let Some(start) = line.strip_suffix(b"\\") {
+        last = number;
+        if let Some(start) = line.strip_suffix(b"\\").filter(|start| !start.contains(&b'#')) {
             continued.extend_from_slice(start);
             continued.push(b' ');
             continue;
@@ -53,85 +58,147 @@ fn read(bytes: &[u8]) -> Result<Reader, FormatError> {
             continued.clear();
         }
     }
-    Ok(reader)
+    reader.line(&continued, last)?;
+    reader.finish()
 }
 
 /// A corner of a face: zero-based indices, in the order of the file, of its position, texture coordinates and normal.
 #[derive(Clone, Copy)]
 struct Corner {
     position: u32,
-    uv: Option<u32>,
-    normal: Option<u32>,
+    /// [`NONE`] if it has none.
+    uv: u32,
+    /// [`NONE`] if it has none.
+    normal: u32,
 }
 
-/// The content of an OBJ file read so far, with faces as triangles.
+/// The content of an OBJ file read so far.
 #[derive(Default)]
 struct Reader {
+    space: Option<Space>,
     positions: WorldPositions,
     colors: Vec<Vec3>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
-    corners: Vec<[Corner; 3]>,
+    /// The corners of all faces, and those of each triangle once all is read.
+    corners: Vec<Corner>,
+    /// The number of corners of each face.
+    sizes: Vec<u32>,
+    /// The line and the highest index of a face with vertices that are not defined before it.
+    ahead: Option<(usize, u32)>,
+    faces: Faces,
+    /// Whether the file has free-form surfaces, which are not read.
+    has_patches: bool,
+    /// Whether corners refer to texture coordinates and to normals that the file does not have.
+    undefined: [bool; 2],
 }
 
 impl Reader {
-    /// Reads one line of the file, up to a comment; lines with unknown keywords are ignored. `number` is the line
-    /// number, for error messages.
-    fn line(&mut self, line: &[u8], number: usize) -> Result<(), FormatError> {
-        let mut words = words(line).take_while(|word| !word.starts_with(b"#"));
+    /// Reads one line of the file, up to a comment; lines with unknown keywords are ignored. `line` is the line number,
+    /// for error messages.
+    fn line(&mut self, text: &[u8], line: usize) -> Result<(), FormatError> {
+        if text.trim_ascii_start().starts_with(b"#") {
+            self.space = self.space.or_else(|| stated_space(text));
+            return Ok(());
+        }
+        let mut words = words(text).take_while(|word| !word.starts_with(b"#"));
         match words.next() {
-            Some(b"v") => self.vertex(&numbers(words, number, 3)?),
+            Some(b"v") => self.vertex(&numbers(words, line, 3)?),
             Some(b"vt") => {
-                let uv = numbers(words, number, 1)?;
+                let uv = numbers(words, line, 1)?;
                 self.uvs.push(Vec2::new(uv[0] as f32, uv.get(1).map_or(0.0, |&v| v as f32)));
             }
-            Some(b"vn") => self.normals.push(DVec3::from_slice(&numbers(words, number, 3)?).as_vec3()),
-            Some(b"f") => self.face(words, number)?,
+            Some(b"vn") => self.normals.push(DVec3::from_slice(&numbers(words, line, 3)?).as_vec3()),
+            Some(b"f") => self.face(words, line)?,
+            Some(b"surf" | b"bsp" | b"bzp" | b"cdp") => self.has_patches = true,
             _ => {}
         }
         Ok(())
     }
 
-    /// Adds a vertex from the numbers on its line: a position, and a colour if three more numbers follow. A fourth
-    /// number alone, or before the colour, is a weight, which is ignored.
+    /// Adds a vertex from the numbers on its line: a position, and a colour if three more numbers follow. Ignored are a
+    /// fourth number alone, which is a weight, and one after the colour, its opacity.
     fn vertex(&mut self, numbers: &[f64]) {
         self.positions.push(DVec3::from_slice(numbers));
         match numbers {
-            [_, _, _, r, g, b] | [_, _, _, _, r, g, b] => self.colors.push(DVec3::new(*r, *g, *b).as_vec3()),
+            [_, _, _, r, g, b] | [_, _, _, r, g, b, _] => self.colors.push(DVec3::new(*r, *g, *b).as_vec3()),
             _ => {}
         }
     }
 
-    /// Adds a face as a fan of triangles.
+    /// Adds the corners of a face, unless they are fewer than three.
     fn face<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>, line: usize) -> Result<(), FormatError> {
-        let corners = words.map(|word| self.corner(word, line)).collect::<Result<Vec<_>, _>>()?;
-        let [first, rest @ ..] = corners.as_slice() else { return Err(face_size(line, 0)) };
-        if rest.len() < 2 {
-            return Err(face_size(line, corners.len()));
+        let first = self.corners.len();
+        for word in words {
+            let corner = self.corner(word, line)?;
+            self.corners.push(corner);
         }
-        self.corners.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+        let size = self.corners.len() - first;
+        if self.faces.is_face(size) {
+            self.sizes.push(size as u32);
+        } else {
+            self.corners.truncate(first);
+        }
         Ok(())
     }
 
     /// Parses a corner of a face: `v`, `v/vt`, `v//vn` or `v/vt/vn`.
-    fn corner(&self, word: &[u8], line: usize) -> Result<Corner, FormatError> {
+    fn corner(&mut self, word: &[u8], line: usize) -> Result<Corner, FormatError> {
         let mut parts = word.split(|&b| b == b'/');
-        let mut part = |table: &str, count: usize| match parts.next() {
+        let mut part = |count: usize| match parts.next() {
             None | Some(b"") => Ok(None),
-            Some(digits) => index(digits, table, count, line).map(Some),
+            Some(digits) => index(digits, count, line).map(|index| Some((digits, index))),
         };
-        let position = part("v", self.positions.len())?;
-        let uv = part("vt", self.uvs.len())?;
-        let normal = part("vn", self.normals.len())?;
-        let problem =
-            || FormatError::invalid(FORMAT, format!("line {line}"), "a face corner has no vertex index");
-        Ok(Corner { position: position.ok_or_else(problem)?, uv, normal })
+        let (position, uv, normal) =
+            (part(self.positions.len())?, part(self.uvs.len())?, part(self.normals.len())?);
+        let problem = || invalid(line, "a face corner has no vertex index".into());
+        let (digits, position) = position.ok_or_else(problem)?;
+        let position = position.ok_or_else(|| out_of_range(digits, self.positions.len(), line))?;
+        if position as usize >= self.positions.len() && self.ahead.is_none_or(|(_, most)| most < position) {
+            self.ahead = Some((line, position));
+        }
+        let mut attribute = |found: Option<(&[u8], Option<u32>)>, which: usize| {
+            let Some((_, index)) = found else { return NONE };
+            self.undefined[which] |= index.is_none();
+            index.unwrap_or(NONE)
+        };
+        Ok(Corner { position, uv: attribute(uv, 0), normal: attribute(normal, 1) })
     }
 
-    fn into_mesh(self) -> Result<TriangleMesh, FormatError> {
-        let triangles: Vec<[u32; 3]> = self.corners.iter().map(|c| c.map(|corner| corner.position)).collect();
-        let corner_uvs = self.per_corner(|corner| corner.uv.map(|i| self.uvs[i as usize]));
-        let corner_normals = self.per_corner(|corner| corner.normal.map(|i| self.normals[i as usize]));
+    /// Replaces faces by triangles when all is read, since faces may refer to vertices that follow them.
+    fn finish(mut self) -> Result<Self, FormatError> {
+        let count = self.positions.len();
+        if let Some((line, most)) = self.ahead.filter(|&(_, most)| most as usize >= count) {
+            return Err(out_of_range((most as u64 + 1).to_string().as_bytes(), count, line));
+        }
+        let corners = mem::take(&mut self.corners);
+        let (mut rest, positions) = (corners.as_slice(), &self.positions);
+        for &size in &self.sizes {
+            let (face, after) = rest.split_at(size as usize);
+            let at = |k: usize| positions.at(face[k].position as usize);
+            self.faces.triangulate(face.len(), at, |triangle| self.corners.extend(triangle.map(|k| face[k])));
+            rest = after;
+        }
+        let counts = [self.uvs.len(), self.normals.len()];
+        for corner in &mut self.corners {
+            for (which, index) in [&mut corner.uv, &mut corner.normal].into_iter().enumerate() {
+                if *index as usize >= counts[which] && *index != NONE {
+                    (*index, self.undefined[which]) = (NONE, true);
+                }
+            }
+        }
+        Ok(self)
+    }
+
+    /// Returns the triangles' corners.
+    fn triangles(&self) -> &[[Corner; 3]] {
+        self.corners.as_chunks().0
+    }
+
+    fn into_mesh(self) -> Result<MeshFile, FormatError> {
+        let triangles: Vec<[u32; 3]> = self.triangles().iter().map(|t| t.map(|c| c.position)).collect();
+        let corner_uvs = self.per_corner(|corner| self.uvs.get(corner.uv as usize).copied());
+        let corner_normals = self.per_corner(|corner| self.normals.get(corner.normal as usize).copied());
         let normals = corner_normals.map(|normals| {
             let mut sums = vec![Vec3::ZERO; self.positions.len()];
             let corners = triangles.as_flattened().iter().zip(normals.as_flattened());
@@ -141,45 +208,63 @@ impl Reader {
         let colors = (self.colors.len() == self.positions.len()).then_some(self.colors);
         let relative = self.positions.relative_in(&triangles);
         let (positions, origin) = relative.map_err(|error| FormatError::positions(FORMAT, &error))?;
-        Ok(TriangleMesh { positions, origin, triangles, normals, corner_uvs, colors, ..Default::default() })
+        let mesh =
+            TriangleMesh { positions, origin, triangles, normals, corner_uvs, colors, ..Default::default() };
+        let mut file = MeshFile { space: self.space, ..MeshFile::from(mesh) };
+        for (is_undefined, name) in self.undefined.into_iter().zip(["texture coordinates", "normals"]) {
+            if is_undefined {
+                file.warn(format!(
+                    "Faces refer to {name} that the file does not have: {name} were left out."
+                ));
+            }
+        }
+        if self.has_patches {
+            file.warn("Free-form surfaces were left out: save the file as polygons to have them.");
+        }
+        self.faces.warn(&mut file);
+        Ok(file)
     }
 
     fn into_points(mut self) -> Result<PointCloud, FormatError> {
-        let named = self.corners.as_flattened().iter().any(|corner| corner.normal.is_some());
+        let named = self.corners.iter().any(|corner| corner.normal != NONE);
         let in_order = !named && self.normals.len() == self.positions.len();
         let own = in_order.then(|| mem::take(&mut self.normals));
-        let mesh = self.into_mesh()?;
-        Ok(PointCloud {
-            points: mesh.positions,
-            origin: mesh.origin,
-            normals: own.or(mesh.normals.filter(|_| named)),
-            colors: mesh.colors,
-        })
+        let MeshFile { mesh, warnings, .. } = self.into_mesh()?;
+        let normals = own.or(mesh.normals.filter(|_| named));
+        Ok(PointCloud { points: mesh.positions, origin: mesh.origin, normals, colors: mesh.colors, warnings })
     }
 
     /// Returns the value of `read` at each corner of all triangles; `None` if it is missing at any corner.
     fn per_corner<T>(&self, read: impl Fn(&Corner) -> Option<T>) -> Option<Vec<[T; 3]>> {
-        self.corners.iter().map(|[a, b, c]| Some([read(a)?, read(b)?, read(c)?])).collect()
+        self.triangles().iter().map(|[a, b, c]| Some([read(a)?, read(b)?, read(c)?])).collect()
     }
 }
 
-fn face_size(line: usize, corners: usize) -> FormatError {
-    let problem = format!("a face must have at least three corners, got {corners}");
+fn invalid(line: usize, problem: String) -> FormatError {
     FormatError::invalid(FORMAT, format!("line {line}"), problem)
 }
 
+/// Returns the error for the index of a vertex that is not defined, of `count` that are.
+fn out_of_range(digits: &[u8], count: usize, line: usize) -> FormatError {
+    let found = String::from_utf8_lossy(&digits[..digits.len().min(20)]);
+    let accepted = match count {
+        0 => "there are no vertices".into(),
+        _ => format!("must be 1 to {count}, or −1 to −{count}"),
+    };
+    invalid(line, format!("v index {found} is out of range; {accepted}"))
+}
+
 /// Converts an OBJ index, which counts from 1, or backwards from −1 at the last of the `count` entries read so far, to
-/// a zero-based one.
-fn index(digits: &[u8], table: &str, count: usize, line: usize) -> Result<u32, FormatError> {
+/// a zero-based one, which may be that of an entry that follows; `None` if there can't be such an entry. An error for
+/// what is no integer.
+fn index(digits: &[u8], count: usize, line: usize) -> Result<Option<u32>, FormatError> {
     let number = std::str::from_utf8(digits).ok().and_then(|text| text.parse::<i64>().ok());
-    let resolved = number.and_then(|n| if n < 0 { n.checked_add(count as i64) } else { n.checked_sub(1) });
-    resolved.and_then(|i| u32::try_from(i).ok()).filter(|&i| (i as usize) < count).ok_or_else(|| {
-        let found = String::from_utf8_lossy(&digits[..digits.len().min(20)]).into_owned();
-        let problem = format!(
-            "{table} index {found} is out of range; 1 to {count} (or −1 to −{count}) are defined so far"
-        );
-        FormatError::invalid(FORMAT, format!("line {line}"), problem)
-    })
+    let number = number.ok_or_else(|| {
+        let found = String::from_utf8_lossy(&digits[..digits.len().min(20)]);
+        invalid(line, format!("index {found} must be an integer"))
+    })?;
+    let resolved = if number < 0 { number.checked_add(count as i64) } else { number.checked_sub(1) };
+    Ok(resolved.and_then(|i| u32::try_from(i).ok()).filter(|&i| i != NONE))
 }
 
 /// Parses the words of a line as numbers; an error if one is not a number, or there are fewer than `min_count`.
@@ -188,20 +273,19 @@ fn numbers<'a>(
     line: usize,
     min_count: usize,
 ) -> Result<Vec<f64>, FormatError> {
-    let number = |word: &[u8]| std::str::from_utf8(word).ok()?.parse::<f64>().ok();
     let found: Option<Vec<f64>> = words.map(number).collect();
-    found.filter(|numbers| numbers.len() >= min_count).ok_or_else(|| {
-        FormatError::invalid(
-            FORMAT,
-            format!("line {line}"),
-            format!("must have at least {min_count} numbers"),
-        )
-    })
+    let problem = || invalid(line, format!("must have at least {min_count} numbers"));
+    found.filter(|numbers| numbers.len() >= min_count).ok_or_else(problem)
 }
 
 /// Returns the text of an OBJ file of the mesh, with numbers in the shortest form that reads back exactly.
-pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
-    let mut text = comments(notes, "# warning ", "\n");
+pub(super) fn write(mesh: &TriangleMesh, options: &WriteOptions) -> Vec<u8> {
+    // Comments at the start of the file are all that some readers look at.
+    let mut text = options.frame().comment("# ");
+    if !text.is_empty() {
+        text.push('\n');
+    }
+    text.push_str(&comments(options.notes, "# warning ", "\n"));
     text.push_str("# vertices and faces\n");
     for (i, p) in mesh.positions.iter().enumerate() {
         if mesh.origin == DVec3::ZERO {

@@ -1,21 +1,29 @@
 //! Reader and writer of PLY, text and binary in both byte orders. Elements and properties beyond those of a mesh are
 //! ignored.
 
-use super::FormatError;
+use super::faces::Faces;
 use super::mesh_file::{color_bytes, push_floats};
-use super::notes::comments;
+use super::notes::{comments, stated_space};
+use super::text::number;
+use super::{FormatError, MeshFile, WriteOptions};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::mesh::{TriangleMesh, WorldPositions};
+use crate::volume::Space;
 
 pub(super) const FORMAT: &str = "PLY";
 
+/// Returns whether the bytes are a PLY file, by its first line.
+pub(super) fn is_ply(bytes: &[u8]) -> bool {
+    bytes.strip_prefix(b"ply").is_some_and(|rest| rest.first().is_some_and(u8::is_ascii_whitespace))
+}
+
 /// Reads a mesh from a PLY file.
-pub(super) fn parse(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+pub(super) fn parse(bytes: &[u8]) -> Result<MeshFile, FormatError> {
     read(bytes, Reader::faces)
 }
 
 /// Reads the vertices of a PLY file with their attributes, for point clouds; faces are skipped, whatever they hold.
-pub(super) fn parse_vertices(bytes: &[u8]) -> Result<TriangleMesh, FormatError> {
+pub(super) fn parse_vertices(bytes: &[u8]) -> Result<MeshFile, FormatError> {
     read(bytes, |_, element, body| skip_element(element, body))
 }
 
@@ -23,19 +31,27 @@ pub(super) fn parse_vertices(bytes: &[u8]) -> Result<TriangleMesh, FormatError> 
 fn read(
     bytes: &[u8],
     faces: impl Fn(&mut Reader, &Element, &mut Body) -> Result<(), FormatError>,
-) -> Result<TriangleMesh, FormatError> {
+) -> Result<MeshFile, FormatError> {
     let (header, body) = Header::parse(bytes)?;
-    let mut body = Body { encoding: header.encoding, bytes: body };
+    let mut body = Body { encoding: header.encoding, bytes: body, splits_lines: false };
     let mut reader = Reader::default();
     for element in &header.elements {
         element.check_size(&body)?;
         match element.name.as_str() {
             "vertex" => reader.vertices(element, &mut body)?,
-            "face" => faces(&mut reader, element, &mut body)?,
+            "face" | "tristrips" => faces(&mut reader, element, &mut body)?,
             _ => skip_element(element, &mut body)?,
         }
     }
-    reader.finish()
+    let mut file = reader.finish()?;
+    body.check_end(&mut file)?;
+    file.space = header.space;
+    if let Some(line) = header.unknown_line {
+        file.warn(format!(
+            "The line \"{line}\" of the header was ignored: it does not start with \"comment\"."
+        ));
+    }
+    Ok(file)
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -160,14 +176,24 @@ impl Element {
 struct Header {
     encoding: Encoding,
     elements: Vec<Element>,
+    /// The space that a comment states.
+    space: Option<Space>,
+    /// The first line before all elements that does not belong in a header, such as a comment without its keyword.
+    unknown_line: Option<String>,
 }
 
 impl Header {
     fn parse(bytes: &[u8]) -> Result<(Self, &[u8]), FormatError> {
         let mut rest = bytes;
         let (mut encoding, mut elements) = (None, Vec::new());
+        let (mut space, mut unknown_line) = (None, None);
         loop {
             let line = take_line(&mut rest)?;
+            if line.starts_with(b"comment") || line.starts_with(b"obj_info") {
+                space = space.or_else(|| stated_space(line));
+                continue;
+            }
+            let line = String::from_utf8_lossy(line);
             let words: Vec<&str> = line.split_ascii_whitespace().collect();
             match words.as_slice() {
                 ["end_header"] => break,
@@ -178,34 +204,28 @@ impl Header {
                     let missing = || FormatError::invalid(FORMAT, "property", "must follow an element");
                     element.ok_or_else(missing)?.properties.push(parse_property(property)?);
                 }
-                [] | ["ply"] | ["comment" | "obj_info", ..] => {}
+                [] | ["ply"] => {}
+                // Before the first element this cannot be a declaration that matters: what follows would contradict.
+                _ if elements.is_empty() => unknown_line = unknown_line.or(Some(clipped(&line))),
                 _ => {
-                    return Err(FormatError::invalid(
-                        FORMAT,
-                        "header",
-                        format!("\"{}\" is not a header line", clipped(line)),
-                    ));
+                    let problem = format!("\"{}\" is not a header line", clipped(&line));
+                    return Err(FormatError::invalid(FORMAT, "header", problem));
                 }
             }
         }
         let encoding = encoding.ok_or_else(|| FormatError::invalid(FORMAT, "format", "is missing"))?;
-        Ok((Self { encoding, elements }, rest))
+        Ok((Self { encoding, elements, space, unknown_line }, rest))
     }
 }
 
 /// Takes a line of the PLY header, without its line ending, from the front of `rest`.
-fn take_line<'a>(rest: &mut &'a [u8]) -> Result<&'a str, FormatError> {
-    let invalid = |problem| FormatError::invalid(FORMAT, "header", problem);
-    let end =
-        rest.iter().position(|&b| b == b'\n' || b == b'\r').ok_or_else(|| invalid("has no end_header"))?;
+fn take_line<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], FormatError> {
+    let end = rest.iter().position(|&b| b == b'\n' || b == b'\r');
+    let end = end.ok_or_else(|| FormatError::invalid(FORMAT, "header", "has no end_header"))?;
     let (line, after) = rest.split_at(end);
     let ended = if after.starts_with(b"\r\n") { 2 } else { 1 };
     *rest = &after[ended..];
-    // Comments may be in any encoding.
-    if line.starts_with(b"comment") || line.starts_with(b"obj_info") {
-        return Ok("comment");
-    }
-    std::str::from_utf8(line).map_err(|_| invalid("is not text"))
+    Ok(line)
 }
 
 fn parse_encoding(name: &str, version: &str) -> Result<Encoding, FormatError> {
@@ -264,9 +284,34 @@ fn clipped(text: &str) -> String {
 struct Body<'a> {
     encoding: Encoding,
     bytes: &'a [u8],
+    /// Whether a record of text ended before its line did.
+    splits_lines: bool,
 }
 
 impl Body<'_> {
+    /// Notes whether the line of a record of text goes on after it.
+    fn end_record(&mut self) {
+        if self.encoding == Encoding::Text {
+            let next = self.bytes.iter().find(|&&b| !b.is_ascii_whitespace() || b == b'\n' || b == b'\r');
+            self.splits_lines |= next.is_some_and(|&b| b != b'\n' && b != b'\r');
+        }
+    }
+
+    /// Adds a warning if there are numbers after the last record of text; an error if lines have more numbers than records:
+    /// numbers were then read as those of other properties.
+    fn check_end(&self, file: &mut MeshFile) -> Result<(), FormatError> {
+        let rest = self.bytes.trim_ascii();
+        if self.encoding != Encoding::Text || rest.is_empty() || rest == b"\x1a" {
+            return Ok(());
+        }
+        if self.splits_lines {
+            let problem = "has more numbers in a line than the header declares properties";
+            return Err(FormatError::invalid(FORMAT, "body", problem));
+        }
+        file.warn("What follows the elements that the header declares was left out.");
+        Ok(())
+    }
+
     /// Reads the next number, of type `kind` in a binary file; `field` is its name in error messages.
     fn number(&mut self, kind: NumberType, field: &str) -> Result<f64, FormatError> {
         if self.encoding == Encoding::Text {
@@ -293,7 +338,7 @@ impl Body<'_> {
         if word.is_empty() {
             return Err(FormatError::truncated(FORMAT, field, 1, 0));
         }
-        std::str::from_utf8(word).ok().and_then(|word| word.parse().ok()).ok_or_else(|| {
+        number(word).ok_or_else(|| {
             let found = clipped(&String::from_utf8_lossy(word));
             FormatError::invalid(FORMAT, field, format!("\"{found}\" is not a number"))
         })
@@ -326,6 +371,7 @@ fn skip_element(element: &Element, body: &mut Body) -> Result<(), FormatError> {
     let count = if element.properties.is_empty() { 0 } else { element.count };
     for _ in 0..count {
         element.properties.iter().try_for_each(|property| body.property(property, &mut values))?;
+        body.end_record();
     }
     Ok(())
 }
@@ -336,6 +382,7 @@ struct Reader {
     mesh: TriangleMesh,
     positions: WorldPositions,
     corner_uvs: Vec<[Vec2; 3]>,
+    faces: Faces,
 }
 
 impl Reader {
@@ -353,6 +400,7 @@ impl Reader {
                 body.property(property, &mut values)?;
                 *slot = values.first().copied().unwrap_or(0.0);
             }
+            body.end_record();
             let vector = |at: [usize; 3]| Vec3::from_array(at.map(|i| record[i] as f32));
             self.positions.push(DVec3::from_array(position.map(|i| record[i])));
             if let Some(at) = normal {
@@ -370,10 +418,12 @@ impl Reader {
         Ok(())
     }
 
-    /// Reads the faces as triangles, with the texture coordinates at their corners if the file has them.
+    /// Reads faces, or strips of triangles, as triangles, with the texture coordinates at the corners of faces if the file
+    /// has them.
     fn faces(&mut self, element: &Element, body: &mut Body) -> Result<(), FormatError> {
         let Some(indices_at) = element.index_of(&["vertex_indices", "vertex_index"]) else {
-            return Err(FormatError::invalid(FORMAT, "element face", "has no property vertex_indices"));
+            let field = format!("element {}", element.name);
+            return Err(FormatError::invalid(FORMAT, field, "has no property vertex_indices"));
         };
         let uvs_at = element.index_of(&["texcoord"]);
         let (mut indices, mut uvs, mut other) = (Vec::new(), Vec::new(), Vec::new());
@@ -386,45 +436,68 @@ impl Reader {
                 };
                 body.property(property, target)?;
             }
-            self.fan(&indices, &uvs, face)?;
-        }
-        Ok(())
-    }
-
-    /// Adds a polygon as a fan of triangles; `face` is its index, for error messages.
-    fn fan(&mut self, indices: &[f64], uvs: &[f64], face: usize) -> Result<(), FormatError> {
-        let invalid = |problem| Err(FormatError::invalid(FORMAT, format!("face {face}"), problem));
-        let limit = self.positions.len() as f64;
-        if let Some(bad) = indices.iter().find(|&&i| !(i >= 0.0 && i < limit && i.fract() == 0.0)) {
-            return invalid(format!("vertex index {bad} is out of range; must be an integer in 0..{limit}"));
-        }
-        if indices.len() < 3 {
-            return invalid(format!("must have at least three corners, got {}", indices.len()));
-        }
-        for k in 1..indices.len() - 1 {
-            self.mesh.triangles.push([0, k, k + 1].map(|i| indices[i] as u32));
-            if uvs.len() == 2 * indices.len() {
-                let uv = |i: usize| Vec2::new(uvs[2 * i] as f32, uvs[2 * i + 1] as f32);
-                self.corner_uvs.push([0, k, k + 1].map(uv));
+            body.end_record();
+            if element.name == "face" {
+                self.face(&indices, &uvs, face)?;
+            } else {
+                indices.split(|&index| index == -1.0).try_for_each(|strip| self.strip(strip, face))?;
             }
         }
         Ok(())
     }
 
+    /// Returns an error unless all indices are of vertices; `place` names where they are.
+    fn check_indices(&self, indices: &[f64], place: impl Fn() -> String) -> Result<(), FormatError> {
+        let limit = self.positions.len() as f64;
+        let Some(bad) = indices.iter().find(|&&i| !(i >= 0.0 && i < limit && i.fract() == 0.0)) else {
+            return Ok(());
+        };
+        let problem = format!("vertex index {bad} is out of range; must be an integer in 0..{limit}");
+        Err(FormatError::invalid(FORMAT, place(), problem))
+    }
+
+    /// Adds a strip of triangles, each of the last two vertices and the next; `at` is the number of its record.
+    fn strip(&mut self, strip: &[f64], at: usize) -> Result<(), FormatError> {
+        self.check_indices(strip, || format!("tristrips {at}"))?;
+        let triangles = strip.windows(3).zip(0..).map(|(w, i)| [w[0], w[1 + i % 2], w[2 - i % 2]]);
+        self.mesh.triangles.extend(triangles.map(|t| t.map(|index| index as u32)));
+        Ok(())
+    }
+
+    /// Adds the triangles of a polygon, unless it has fewer than three corners; `face` is its index, for error messages.
+    fn face(&mut self, indices: &[f64], uvs: &[f64], face: usize) -> Result<(), FormatError> {
+        self.check_indices(indices, || format!("face {face}"))?;
+        if !self.faces.is_face(indices.len()) {
+            return Ok(());
+        }
+        let (triangles, corner_uvs) = (&mut self.mesh.triangles, &mut self.corner_uvs);
+        let uv = |i: usize| Vec2::new(uvs[2 * i] as f32, uvs[2 * i + 1] as f32);
+        let at = |corner: usize| self.positions.at(indices[corner] as usize);
+        self.faces.triangulate(indices.len(), at, |corners| {
+            triangles.push(corners.map(|i| indices[i] as u32));
+            if uvs.len() == 2 * indices.len() {
+                corner_uvs.push(corners.map(uv));
+            }
+        });
+        Ok(())
+    }
+
     /// Returns the mesh that was read; texture coordinates per corner are kept if every face has them.
-    fn finish(self) -> Result<TriangleMesh, FormatError> {
+    fn finish(self) -> Result<MeshFile, FormatError> {
         let per_corner = !self.corner_uvs.is_empty() && self.corner_uvs.len() == self.mesh.triangles.len();
         let relative = self.positions.relative_in(&self.mesh.triangles);
         let (positions, origin) = relative.map_err(|error| FormatError::positions(FORMAT, &error))?;
         let corner_uvs = per_corner.then_some(self.corner_uvs);
-        Ok(TriangleMesh { positions, origin, corner_uvs, ..self.mesh })
+        let mut file = MeshFile::from(TriangleMesh { positions, origin, corner_uvs, ..self.mesh });
+        self.faces.warn(&mut file);
+        Ok(file)
     }
 }
 
 /// Returns the bytes of a binary little-endian PLY file of the mesh, with colours in 8 bits, and positions in double
 /// precision if the mesh has an origin.
-pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
-    let mut out = header(mesh, notes).into_bytes();
+pub(super) fn write(mesh: &TriangleMesh, options: &WriteOptions) -> Vec<u8> {
+    let mut out = header(mesh, options).into_bytes();
     for (i, p) in mesh.positions.iter().enumerate() {
         if is_double(mesh) {
             mesh.world_position(i).to_array().iter().for_each(|x| out.extend(x.to_le_bytes()));
@@ -457,9 +530,10 @@ fn is_double(mesh: &TriangleMesh) -> bool {
     mesh.origin != DVec3::ZERO
 }
 
-fn header(mesh: &TriangleMesh, notes: &str) -> String {
-    let comments = comments(notes, "\ncomment warning ", "");
-    let mut lines = vec!["ply".into(), format!("format binary_little_endian 1.0{comments}")];
+fn header(mesh: &TriangleMesh, options: &WriteOptions) -> String {
+    let space = options.frame().comment("\ncomment ");
+    let comments = comments(options.notes, "\ncomment warning ", "");
+    let mut lines = vec!["ply".into(), format!("format binary_little_endian 1.0{space}{comments}")];
     let properties = |lines: &mut Vec<String>, kind: &str, names: &[&str]| {
         lines.extend(names.iter().map(|name| format!("property {kind} {name}")));
     };

@@ -1,7 +1,7 @@
 //! Reader of point clouds in text with a line per point: numbers in columns (XYZ, PTS, CSV and similar), or after a
 //! keyword (`p x y z`).
 
-use super::text::{Field, numbered_lines};
+use super::text::{Field, number, numbered_lines};
 use super::{FormatError, PointCloud, points::full_channel};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::WorldPositions;
@@ -35,16 +35,16 @@ impl Line<'_> {
 
     /// Returns whether all cells of the line are numbers.
     fn is_row(&self) -> bool {
-        cells(&self.text, separator(&self.text)).iter().all(|cell| cell.parse::<f64>().is_ok())
+        row(&self.text, separator(&self.text)).iter().all(|cell| number(cell.as_bytes()).is_some())
     }
 
     /// Parses a cell of the line as a finite number.
     fn number(&self, format: &'static str, cell: &str) -> Result<f64, FormatError> {
         let invalid = |problem| Err(Field { format, name: &self.field(), text: cell }.invalid(problem));
-        match cell.parse::<f64>() {
-            Ok(number) if (number as f32).is_finite() => Ok(number),
-            Ok(_) => invalid("must be finite and within ±3.4e38"),
-            Err(_) => invalid("must be a number with a decimal point, not a comma"),
+        match number(cell.as_bytes()) {
+            Some(number) if (number as f32).is_finite() => Ok(number),
+            Some(_) => invalid("must be finite and within ±3.4e38"),
+            None => invalid("must be a number with a decimal point, not a comma"),
         }
     }
 }
@@ -84,6 +84,15 @@ fn cells(line: &str, separator: Option<char>) -> Vec<&str> {
     cells.take(MAX_COLUMNS + 1).map(unquoted).collect()
 }
 
+/// Returns the cells of a line of numbers, which may end with a separator.
+fn row(line: &str, separator: Option<char>) -> Vec<&str> {
+    let mut cells = cells(line, separator);
+    if cells.last().is_some_and(|last| last.is_empty()) {
+        cells.pop();
+    }
+    cells
+}
+
 fn unquoted(cell: &str) -> &str {
     let cell = cell.trim();
     cell.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(cell, str::trim)
@@ -96,7 +105,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PointCloud, FormatError> {
     let named = take_column_names(&mut lines, count_line.is_some())?;
     let Some(first) = lines.peek() else { return Ok(PointCloud::default()) };
     let separator = separator(&first.text);
-    let count = cells(&first.text, separator).len();
+    let count = row(&first.text, separator).len();
     let columns = match named.or_else(|| named_in_comment(bytes, count)) {
         Some(columns) => columns,
         None => Columns::unnamed(count, first)?,
@@ -179,7 +188,8 @@ impl Columns {
         }
         let points = set(["x", "y", "z"]).or_else(|| napari_axes(&names))?;
         let normals = set(["nx", "ny", "nz"]);
-        let colors = set(["red", "green", "blue"]).or_else(|| set(["r", "g", "b"]));
+        let colors =
+            [["red", "green", "blue"], ["r", "g", "b"], ["rf", "gf", "bf"]].into_iter().find_map(set);
         let extras = Extras {
             normals: normals.as_ref().map(|_| 3),
             colors: colors.as_ref().map(|_| if normals.is_some() { 6 } else { 3 }),
@@ -195,7 +205,9 @@ impl Columns {
             let accepted = "3, 4, 6, 7 or 9 columns, or a first line with column names";
             return Err(FormatError::unsupported(FORMAT, first.field(), columns(count), accepted));
         }
-        Ok(Self { count, read: (0..count).collect(), extras: None })
+        // An intensity is not read.
+        let read = (0..count).filter(|&column| column != 3 || ![4, 7].contains(&count)).collect();
+        Ok(Self { count, read, extras: None })
     }
 }
 
@@ -234,7 +246,10 @@ impl Table {
     /// Appends the numbers of a line in the columns that are read; an error if the line has too few or too many
     /// columns.
     fn push(&mut self, line: &Line, separator: Option<char>) -> Result<(), FormatError> {
-        let cells = cells(&line.text, separator);
+        let mut cells = cells(&line.text, separator);
+        if cells.len() == self.columns.count + 1 && cells.last().is_some_and(|last| last.is_empty()) {
+            cells.pop();
+        }
         if cells.len() != self.columns.count {
             let (found, accepted) = (columns(cells.len()), columns(self.columns.count));
             let problem =
@@ -265,7 +280,7 @@ impl Table {
         let world = self.rows().map(DVec3::from_slice).collect::<WorldPositions>();
         let (points, origin) = world.relative();
         let (normals, colors) = (extras.normals.map(all), extras.colors.map(all));
-        Ok(PointCloud { points, origin, normals, colors })
+        Ok(PointCloud { points, origin, normals, colors, ..PointCloud::default() })
     }
 
     /// Returns which columns of a file without column names hold normals and colours. Normals are recognised by their
@@ -274,7 +289,7 @@ impl Table {
         let (normals, colors) = match self.columns.count {
             6 if self.are_normals(3) => (Some(3), None),
             6 => (None, Some(3)),
-            7 => (None, Some(4)),
+            7 => (None, Some(3)),
             9 if self.are_normals(6) && self.are_colors(3) => (Some(6), Some(3)),
             9 => (Some(3), Some(6)),
             _ => (None, None),
@@ -304,7 +319,7 @@ impl Table {
 pub(super) fn has_keywords(bytes: &[u8]) -> bool {
     content(bytes).any(|line| {
         let mut words = line.text.split_whitespace();
-        words.next() == Some("p") && words.next().is_some_and(|word| word.parse::<f64>().is_ok())
+        words.next() == Some("p") && words.next().is_some_and(|word| number(word.as_bytes()).is_some())
     })
 }
 
@@ -454,7 +469,7 @@ mod tests {
     fn errors_name_their_line() {
         for (text, said) in [
             ("1 2 3\r\n4 5\r\n", "point text: line 2: '4 5': must have 3 columns"),
-            ("1,2,3\n4,5,6,\n", "point text: line 2: '4,5,6,': must have 3 columns"),
+            ("1,2,3\n4,5,6,7\n", "point text: line 2: '4,5,6,7': must have 3 columns"),
             ("x,y,z\n1,2,3,4\n", "point text: line 2: '1,2,3,4': must have 3 columns"),
             ("1 2 3\n4 five 6\n", "point text: line 2: 'five': must be a number"),
             ("1;2;3\n1,5;2;3\n", "point text: line 2: '1,5': must be a number"),

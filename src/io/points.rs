@@ -1,9 +1,10 @@
 //! Reading of point clouds: detection of the format, and checks common to all formats.
 
-use super::mesh_file::is_text;
-use super::{FormatError, obj, ply, point_text, stl};
+use super::mesh_file::{is_text, known_format};
+use super::text::without_byte_order_mark;
+use super::{FormatError, MeshFile, obj, ply, point_text, stl};
 use crate::math::{DVec3, Vec3};
-use crate::mesh::TriangleMesh;
+use crate::warning::{Warning, WarningCode};
 
 /// A point cloud, in the order of the file. Each optional array has one entry per point.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,6 +17,15 @@ pub struct PointCloud {
     pub normals: Option<Vec<Vec3>>,
     /// Colours, rgb in 0..1.
     pub colors: Option<Vec<Vec3>>,
+    /// Warnings about the points: parts that were left out, and assumptions.
+    pub warnings: Vec<Warning>,
+}
+
+impl PointCloud {
+    /// Adds a warning of the reader.
+    pub(super) fn warn(&mut self, text: impl Into<String>) {
+        self.warnings.push(Warning::new(WarningCode::Reader, text));
+    }
 }
 
 /// Reads the points of a PLY or OBJ file, or of text with a line per point (XYZ, PTS, CSV, TXT); the format is detected
@@ -31,7 +41,7 @@ pub struct PointCloud {
 /// number of points, and the line after it may be a comment without a mark.
 ///
 /// Columns may be named in the first line or in a comment before it: `x`, `y`, `z`, and, in complete sets, `nx`, `ny`,
-/// `nz`, and `red`, `green`, `blue` or `r`, `g`, `b`; case and quotes do not matter. Instead of `x`, `y` and `z`,
+/// `nz`, and `red`, `green`, `blue`, `r`, `g`, `b` or `rf`, `gf`, `bf`; case and quotes do not matter. Instead of `x`, `y` and `z`,
 /// `axis-0` to `axis-2` are z, y, x, and `axis-0` to `axis-3` are time, z, y, x. All other columns are ignored: a file
 /// with a column of times gives the points of all times.
 ///
@@ -51,15 +61,14 @@ pub struct PointCloud {
 /// truncated or contradictory, for numbers that are not finite in 32 bits, for colours out of range, and for files
 /// without points.
 pub fn parse_points(bytes: &[u8]) -> Result<PointCloud, FormatError> {
-    // Some programs start UTF-8 text with a byte order mark.
-    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    let (format, cloud) = parse(bytes)?;
+    let text = without_byte_order_mark(bytes);
+    let (format, cloud) = parse(text.as_deref().unwrap_or(bytes))?;
     validated(format, cloud)
 }
 
 /// Reads points from a file in the format that its bytes indicate; returns the name of the format and the points.
 fn parse(bytes: &[u8]) -> Result<(&'static str, PointCloud), FormatError> {
-    if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
+    if ply::is_ply(bytes) {
         return Ok((ply::FORMAT, vertices(ply::parse_vertices(bytes)?)));
     }
     if let Some(found) = unsupported_format(bytes) {
@@ -80,44 +89,49 @@ fn parse(bytes: &[u8]) -> Result<(&'static str, PointCloud), FormatError> {
 
 /// Returns the name of an unsupported format that the first bytes indicate; `None` for text that may hold points.
 fn unsupported_format(bytes: &[u8]) -> Option<&'static str> {
-    let start = |mark: &[u8]| bytes.starts_with(mark);
-    Some(match bytes {
-        _ if start(b"glTF") => "GLB",
-        _ if stl::is_binary(bytes) || stl::is_text_stl(bytes) => "STL",
-        _ if start(b"<?xml") || start(b"<VTKFile") => "XML",
-        _ if start(b"# vtk") => "VTK legacy",
-        _ if start(b"# .PCD") => "PCD",
-        _ if start(b"OFF") || start(b"COFF") || start(b"NOFF") => "OFF",
-        _ if start(b"LASF") => "LAS",
-        [b'{', ..] => "JSON",
-        [0x1f, 0x8b, ..] => "gzip",
-        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => "text in UTF-16 (it must be UTF-8)",
-        _ if !is_text(bytes) => "an unknown binary format",
-        _ => return None,
+    if bytes.starts_with(b"glTF") {
+        return Some("GLB");
+    }
+    if stl::is_binary(bytes) || stl::is_text_stl(bytes) {
+        return Some("STL");
+    }
+    known_format(bytes).or(match bytes.trim_ascii_start() {
+        [b'{', ..] => Some("JSON"),
+        _ if !is_text(bytes) => Some("an unknown binary format"),
+        _ => None,
     })
 }
 
-fn vertices(mesh: TriangleMesh) -> PointCloud {
-    let TriangleMesh { positions, origin, normals, colors, .. } = mesh;
-    PointCloud { points: positions, origin, normals, colors }
+fn vertices(MeshFile { mesh, warnings, .. }: MeshFile) -> PointCloud {
+    PointCloud {
+        points: mesh.positions,
+        origin: mesh.origin,
+        normals: mesh.normals,
+        colors: mesh.colors,
+        warnings,
+    }
 }
 
 /// Returns a point cloud with its colours scaled to 0..1, after checking that it has points, finite numbers, and a
 /// normal and colour for each point if for any.
-fn validated(format: &'static str, cloud: PointCloud) -> Result<PointCloud, FormatError> {
+fn validated(format: &'static str, mut cloud: PointCloud) -> Result<PointCloud, FormatError> {
     let count = cloud.points.len();
     if count == 0 {
         return Err(FormatError::invalid(format, "points", "the file has no points"));
     }
     check_finite(format, "points", &cloud.points)?;
-    if let Some(normals) = &cloud.normals {
+    if let Some(normals) = &mut cloud.normals {
         check_count(format, "normals", normals, count)?;
-        check_finite(format, "normals", normals)?;
+        let broken = without_broken(normals);
+        if broken > 0 {
+            cloud
+                .warn(format!("{broken} of {count} normals are not finite numbers: these points have none."));
+        }
     }
-    let Some(colors) = cloud.colors else { return Ok(cloud) };
+    let Some(colors) = cloud.colors.take() else { return Ok(cloud) };
     check_count(format, "colours", &colors, count)?;
-    let colors = Some(unit_colors(format, colors)?);
-    Ok(PointCloud { colors, ..cloud })
+    cloud.colors = Some(unit_colors(format, colors)?);
+    Ok(cloud)
 }
 
 /// Returns an error if one of the vectors, which belong to the points in order, is not finite; `field` names them.
@@ -125,6 +139,12 @@ fn check_finite(format: &'static str, field: &str, vectors: &[Vec3]) -> Result<(
     let Some(i) = vectors.iter().position(|v| !v.is_finite()) else { return Ok(()) };
     let problem = format!("point {i} (zero-based) has {}; numbers must be finite", vectors[i]);
     Err(FormatError::invalid(format, field, problem))
+}
+
+/// Replaces vectors that are not finite by 0, and returns their number.
+fn without_broken(vectors: &mut [Vec3]) -> usize {
+    let broken = vectors.iter_mut().filter(|v| !v.is_finite());
+    broken.map(|v| *v = Vec3::ZERO).count()
 }
 
 /// Returns an error unless `found`, an array of normals or colours named `field`, has one vector for each of `count`
@@ -171,6 +191,7 @@ mod tests {
             points: vec![p, Vec3::new(4.0, 5.0, 6.0), p],
             normals: Some(vec![Vec3::X, Vec3::NEG_Z, Vec3::new(0.6, 0.0, 0.8)]),
             colors: Some(vec![Vec3::new(1.0, 0.0, 0.2), Vec3::ZERO, Vec3::new(0.4, 0.6, 0.8)]),
+            warnings: Vec::new(),
         }
     }
 
@@ -315,7 +336,6 @@ mod tests {
             (ply("1 2 3 0 0 0\n4 5 six 0 0 0\n", "float"), "PLY: z: \"six\" is not a number"),
             (ply("", "float").replace("vertex 2", "vertex 4000000000"), "PLY: element vertex: needs"),
             (ply("", "float").replace("vertex 2", "vertex 0"), "PLY: points: the file has no points"),
-            ("v 1 2 3\nvn nan 0 0\n".into(), "OBJ: normals: point 0"),
             ("v 1 2 3\r\nv 1 2\r\n".into(), "OBJ: line 2: must have at least 3 numbers"),
             (String::new(), "point file: content: needs 1 bytes"),
             (

@@ -2,6 +2,7 @@
 
 use super::FormatError;
 use super::beside::DataFiles;
+use std::borrow::Cow;
 use std::iter;
 
 /// Returns the lines of a file with their numbers from 1, without line endings (\n, \r\n or \r).
@@ -18,6 +19,41 @@ pub(super) fn numbered_lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8]
         Some(line)
     });
     (1..).zip(lines)
+}
+
+/// Parses a word as a number, as all programs write it: NaN and infinities also as those of Windows do, `-nan(ind)` and
+/// `1.#QNAN`. `None` for other words.
+pub(super) fn number(word: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(word).ok()?;
+    text.parse().ok().or_else(|| windows_number(text))
+}
+
+/// Parses a number that is not finite in the notations of Windows.
+fn windows_number(text: &str) -> Option<f64> {
+    let (sign, size) = match text.strip_prefix('-') {
+        Some(size) => (-1.0, size),
+        None => (1.0, text.strip_prefix('+').unwrap_or(text)),
+    };
+    let starts = |name: &str| size.get(..name.len()).is_some_and(|start| start.eq_ignore_ascii_case(name));
+    if starts("1.#INF") {
+        return Some(sign * f64::INFINITY);
+    }
+    ["nan(", "1.#QNAN", "1.#SNAN", "1.#IND", "1.#NAN"].into_iter().any(starts).then_some(f64::NAN)
+}
+
+/// Returns text in UTF-16 as UTF-8, and text in UTF-8 without the byte order mark; `None` for bytes without one.
+pub(super) fn without_byte_order_mark(bytes: &[u8]) -> Option<Cow<'_, [u8]>> {
+    let wide = |text: &[u8], number: fn([u8; 2]) -> u16| {
+        let units = text.chunks_exact(2).map(|pair| number([pair[0], pair[1]]));
+        let decoded = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
+        Cow::Owned(decoded.collect::<String>().into_bytes())
+    };
+    match bytes {
+        [0xef, 0xbb, 0xbf, text @ ..] => Some(Cow::Borrowed(text)),
+        [0xff, 0xfe, text @ ..] => Some(wide(text, u16::from_le_bytes)),
+        [0xfe, 0xff, text @ ..] => Some(wide(text, u16::from_be_bytes)),
+        _ => None,
+    }
 }
 
 /// Maximum length of the text header of a volume file, in bytes; real ones have a few kilobytes.
@@ -147,5 +183,40 @@ impl Field<'_> {
     /// Any other text.
     pub(super) fn offset(&self) -> Result<usize, FormatError> {
         Ok(usize::try_from(self.integer(0)?).unwrap_or(usize::MAX))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn numbers_of_every_program() {
+        for word in
+            ["nan", "NaN", "-nan", "-nan(ind)", "nan(snan)", "+NAN(0x1)", "1.#QNAN", "-1.#IND", "1.#SNAN0"]
+        {
+            assert!(number(word.as_bytes()).is_some_and(f64::is_nan), "{word}");
+        }
+        for (word, expected) in [("1.#INF", f64::INFINITY), ("-1.#INF00", f64::NEG_INFINITY), ("+.5e1", 5.0)]
+        {
+            assert_eq!(number(word.as_bytes()), Some(expected));
+        }
+        for word in ["", "-", "nanometre", "1.#", "0x10", "1,5", "\u{e9}"] {
+            assert_eq!(number(word.as_bytes()), None, "{word}");
+        }
+    }
+
+    #[test]
+    fn byte_order_marks() {
+        let text = "v 1 \u{e9}\u{1f600}";
+        let wide: Vec<u16> = "\u{feff}".encode_utf16().chain(text.encode_utf16()).collect();
+        let bytes = |to: fn(u16) -> [u8; 2]| wide.iter().flat_map(|&unit| to(unit)).collect::<Vec<u8>>();
+        for file in [bytes(u16::to_le_bytes), bytes(u16::to_be_bytes), format!("\u{feff}{text}").into_bytes()]
+        {
+            assert_eq!(without_byte_order_mark(&file).as_deref(), Some(text.as_bytes()));
+        }
+        assert_eq!(without_byte_order_mark(text.as_bytes()), None);
     }
 }

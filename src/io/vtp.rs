@@ -1,14 +1,15 @@
 //! Writer of VTP, VTK's XML poly data, with its arrays inline as base64.
 
-use super::base64;
+use super::frame::Frame;
 use super::mesh_file::{color_bytes, push_floats};
 use super::notes::comments;
+use super::{WriteOptions, base64};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 
 /// Returns the text of a VTP file of the mesh with points and triangles; normals, texture coordinates and colours are
 /// point data, for which vertices on texture seams are duplicated.
-pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
+pub(super) fn write(mesh: &TriangleMesh, options: &WriteOptions) -> Vec<u8> {
     let split;
     let mesh = if mesh.corner_uvs.is_some() {
         split = mesh.split_at_seams();
@@ -17,9 +18,10 @@ pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
         mesh
     };
     let mut xml = String::from("<?xml version=\"1.0\"?>\n");
-    xml += &comments(notes, "<!-- warning ", " -->\n");
+    xml += &comments(options.notes, "<!-- warning ", " -->\n");
     xml += "<VTKFile type=\"PolyData\" version=\"1.0\" ";
     xml += "byte_order=\"LittleEndian\" header_type=\"UInt32\">\n<PolyData>\n";
+    xml += &field_data(options.frame());
     xml += &format!(
         "<Piece NumberOfPoints=\"{}\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n",
         mesh.positions.len(),
@@ -34,6 +36,16 @@ pub(super) fn write(mesh: &TriangleMesh, notes: &str) -> Vec<u8> {
     xml += &data_array("Int32", "offsets", 1, offsets);
     xml += "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n";
     xml.into_bytes()
+}
+
+/// Returns the VTP element `FieldData` with the name of the space, as character codes; empty if it is not known.
+fn field_data(frame: Frame) -> String {
+    let Some(name) = frame.space_name() else { return String::new() };
+    let codes: Vec<String> = name.bytes().chain([0]).map(|code| code.to_string()).collect();
+    format!(
+        "<FieldData>\n<Array type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">\n{}\n</Array>\n</FieldData>\n",
+        codes.join(" ")
+    )
 }
 
 /// Returns the VTP element `PointData`, with the vertex attributes that the mesh has.

@@ -23,7 +23,7 @@ pub use glam::{DAffine3, DMat3, DVec2, DVec3, IVec3, Mat3, Vec2, Vec3, Vec3Swizz
 pub use groups::Groups;
 pub use growth::{make_room, resize, resize_within};
 pub use min_max::{higher, lower};
-pub use polygon::triangulate;
+pub use polygon::{triangulate, triangulate_face};
 pub use position_index::PositionIndex;
 pub use quadric::Quadric;
 pub use random::Random;

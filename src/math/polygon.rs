@@ -1,8 +1,15 @@
 //! Triangulation of polygons with holes in the plane: holes are connected with their surroundings by bridges, then ears
 //! are clipped. All decisions are exact, so the triangles cover the polygon without overlap, and none is degenerate.
+//!
+//! Faces of meshes are triangulated by the same means, but whatever their shape: files have faces that are not flat, or
+//! that touch or intersect themselves.
 
-use super::DVec2;
+use super::order::sort_pairs;
 use super::predicates::orient2d;
+use super::{DVec2, DVec3};
+
+/// The part of a face's area by which a triangle of its fan may face backwards, by rounding.
+const FOLD: f64 = 1e-6;
 
 /// Returns triangles that cover the interior of polygons, which is on the left of their edges: outer loops are
 /// counter-clockwise, holes clockwise, and a hole may contain further polygons. Each loop lists indices into `points`;
@@ -14,6 +21,46 @@ pub fn triangulate(points: &[DVec2], loops: &[Vec<u32>]) -> Option<Vec<[u32; 3]>
     let mut polygon = Polygon::new(points, loops)?;
     polygon.bridge_holes()?;
     polygon.clip_ears()
+}
+
+/// Returns triangles of a face with the given corners, as indices into them; `None` if the fan of the first corner is
+/// right, as it is for convex faces, or if the face has no area.
+///
+/// There are always two triangles fewer than corners, and each edge of the face is an edge of one of them, so that faces
+/// that share edges are still closed. The face is triangulated as it is seen along its mean normal. Where it intersects
+/// itself there, or after `effort` tests, of which those made are subtracted, triangles may overlap.
+pub fn triangulate_face(corners: &[DVec3], effort: &mut u64) -> Option<Vec<[u32; 3]>> {
+    let normal = fan(corners).sum::<DVec3>();
+    let fold = -FOLD * normal.length_squared();
+    if !fold.is_finite() || fan(corners).all(|area| area.dot(normal) >= fold) {
+        return None;
+    }
+    let points = seen_along(normal, corners);
+    Some(Polygon::face(&points).clip_whatever(effort))
+}
+
+/// Iterates over the area vectors, twice as long as the areas, of the fan of the first corner.
+fn fan(corners: &[DVec3]) -> impl Iterator<Item = DVec3> {
+    let first = corners.first().copied().unwrap_or_default();
+    corners.windows(2).skip(1).map(move |pair| (pair[0] - first).cross(pair[1] - first))
+}
+
+/// Returns points as seen against a direction, without the coordinate along which it is longest.
+fn seen_along(direction: DVec3, points: &[DVec3]) -> Vec<DVec2> {
+    let size = direction.abs();
+    let axis = if size.z >= size.x && size.z >= size.y { 2 } else { usize::from(size.y >= size.x) };
+    let (mut right, mut up) = ((axis + 1) % 3, (axis + 2) % 3);
+    if direction[axis] < 0.0 {
+        std::mem::swap(&mut right, &mut up);
+    }
+    points.iter().map(|p| DVec2::new(p[right], p[up])).collect()
+}
+
+/// Returns a number that is the same for equal points.
+fn hash(point: DVec2) -> u64 {
+    // Added to 0, negative zero is positive.
+    let [x, y] = [point.x + 0.0, point.y + 0.0].map(f64::to_bits);
+    x.rotate_left(32).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ y
 }
 
 /// Corners of loops, doubly linked. A point has several corners once bridges end in it.
@@ -43,6 +90,24 @@ impl<'a> Polygon<'a> {
             polygon.loops.push(lowest);
         }
         Some(polygon)
+    }
+
+    /// Returns the corners of one loop, of which those in the same place have the same point.
+    fn face(points: &'a [DVec2]) -> Self {
+        let count = points.len();
+        let mut pairs: Vec<(u64, u32)> = points.iter().map(|&p| hash(p)).zip(0..).collect();
+        sort_pairs(&mut pairs);
+        let mut point = vec![0; count];
+        for same_hash in pairs.chunk_by(|a, b| a.0 == b.0) {
+            let first = same_hash[0].1;
+            for &(_, corner) in same_hash {
+                let is_same = points[corner as usize] == points[first as usize];
+                point[corner as usize] = if is_same { first } else { corner };
+            }
+        }
+        let next = (1..count).chain([0]).collect();
+        let previous = (0..count).map(|k| (k + count - 1) % count).collect();
+        Self { points, point, next, previous, loops: Vec::new() }
     }
 
     fn at(&self, corner: usize) -> DVec2 {
@@ -147,36 +212,55 @@ impl<'a> Polygon<'a> {
     }
 
     fn clip_ears(&mut self) -> Option<Vec<[u32; 3]>> {
-        let mut triangles = Vec::with_capacity(self.point.len());
+        let (mut triangles, mut effort) = (Vec::with_capacity(self.point.len()), u64::MAX);
         for first in self.loops.clone() {
-            self.clip_ears_of(first, &mut triangles)?;
+            self.clip_ears_of(first, &mut triangles, &mut effort, |_, _| None)?;
         }
-        Some(triangles)
+        Some(triangles.into_iter().map(|corners| corners.map(|corner| self.point[corner as usize])).collect())
     }
 
-    fn clip_ears_of(&mut self, first: usize, triangles: &mut Vec<[u32; 3]>) -> Option<()> {
+    /// Returns the triangles of a face; where there is no ear, the flattest corner is clipped.
+    fn clip_whatever(&mut self, effort: &mut u64) -> Vec<[u32; 3]> {
+        let mut triangles = Vec::with_capacity(self.point.len());
+        let flattest = |polygon: &Self, first: usize| {
+            let size =
+                |&corner: &usize| polygon.turn(polygon.previous[corner], corner, polygon.next[corner]).abs();
+            polygon.corners(first).min_by(|a, b| size(a).total_cmp(&size(b)))
+        };
+        self.clip_ears_of(0, &mut triangles, effort, flattest);
+        triangles
+    }
+
+    /// Clips the ears of the loop of a corner, and appends the triangles, as corners. Where there is no ear, `instead`
+    /// chooses the corner to clip; `None` if it doesn't. After `effort` tests of points, the rest becomes a fan.
+    fn clip_ears_of(
+        &mut self,
+        first: usize,
+        triangles: &mut Vec<[u32; 3]>,
+        effort: &mut u64,
+        instead: impl Fn(&Self, usize) -> Option<usize>,
+    ) -> Option<()> {
         let mut left = self.corners(first).count();
         let (mut corner, mut misses) = (first, 0);
         while left > 3 {
-            let (previous, next) = (self.previous[corner], self.next[corner]);
-            if self.is_ear(corner) {
-                triangles.push([previous, corner, next].map(|corner| self.point[corner]));
-                self.next[previous] = next;
-                self.previous[next] = previous;
-                (left, misses) = (left - 1, 0);
-                // Not the neighbour: fans of needles would develop.
-                corner = self.next[next];
-            } else {
-                misses += 1;
-                if misses > left {
-                    return None;
-                }
-                corner = next;
+            *effort = effort.saturating_sub(left as u64);
+            if misses > left {
+                corner = instead(self, corner)?;
+            } else if *effort > 0 && !self.is_ear(corner) {
+                (corner, misses) = (self.next[corner], misses + 1);
+                continue;
             }
+            let (previous, next) = (self.previous[corner], self.next[corner]);
+            triangles.push([previous, corner, next].map(|corner| corner as u32));
+            self.next[previous] = next;
+            self.previous[next] = previous;
+            (left, misses) = (left - 1, 0);
+            // Not the neighbour: fans of needles would develop. If there is no effort left, they may.
+            corner = if *effort > 0 { self.next[next] } else { next };
         }
         let last = [self.previous[corner], corner, self.next[corner]];
-        triangles.push(last.map(|corner| self.point[corner]));
-        (self.turn(last[0], last[1], last[2]) > 0.0).then_some(())
+        triangles.push(last.map(|corner| corner as u32));
+        if self.turn(last[0], last[1], last[2]) > 0.0 { Some(()) } else { instead(self, corner).map(|_| ()) }
     }
 
     /// Returns whether the triangle of a corner and its neighbours is inside the polygon and touches none of its other
@@ -275,6 +359,92 @@ mod tests {
                 assert_covers(&points, &loops);
             }
         }
+    }
+
+    /// Triangulates a face, checks that each of its edges is one of a triangle's and all others are shared by two, and
+    /// returns the area of all triangles.
+    fn face_area(corners: &[DVec3]) -> f64 {
+        let count = corners.len() as u32;
+        let fan = || (1..count - 1).map(|k| [0, k, k + 1]).collect();
+        let triangles = triangulate_face(corners, &mut 100_000).unwrap_or_else(fan);
+        let edges = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        let mut open: Vec<[u32; 2]> =
+            edges.clone().filter(|&[a, b]| !edges.clone().any(|e| e == [b, a])).collect();
+        open.sort_unstable();
+        assert_eq!(open, (0..count).map(|k| [k, (k + 1) % count]).collect::<Vec<_>>());
+        let area = |&[a, b, c]: &[u32; 3]| {
+            let [p, q, r] = [a, b, c].map(|k| corners[k as usize]);
+            (q - p).cross(r - p).length() / 2.0
+        };
+        triangles.iter().map(area).sum()
+    }
+
+    /// Returns corners in a plane that is tilted and far away; lengths are kept.
+    fn tilted(corners: &[[f64; 2]]) -> Vec<DVec3> {
+        let (right, up) = (DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.64, 0.6, -0.48));
+        corners.iter().map(|&[x, y]| DVec3::new(8e3, -2e3, 7.0) + right * x + up * y).collect()
+    }
+
+    #[test]
+    fn concave_faces_are_covered_once() {
+        let dart = [[0.0, 0.0], [4.0, 0.0], [1.0, 1.0], [0.0, 4.0]];
+        let step = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+        // The outline with a hole in it, along a slit there and back.
+        let keyhole = [
+            [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [0.0, 0.0]],
+            [[1.0, 1.0], [1.0, 3.0], [3.0, 3.0], [3.0, 1.0], [1.0, 1.0]],
+        ];
+        let twice = [[0.0, 0.0], [4.0, 0.0], [1.0, 1.0], [1.0, 1.0], [0.0, 4.0]];
+        for (face, expected) in
+            [(&dart[..], 4.0), (&step, 3.0), (keyhole.as_flattened(), 12.0), (&twice, 4.0)]
+        {
+            for turn in 0..face.len() {
+                let mut face = face.to_vec();
+                face.rotate_left(turn);
+                let area = face_area(&tilted(&face));
+                assert!((area - expected).abs() < 1e-9, "{area} {expected} {turn}");
+                face.reverse();
+                assert!((face_area(&tilted(&face)) - expected).abs() < 1e-9, "{expected} {turn}");
+            }
+        }
+    }
+
+    #[test]
+    fn convex_faces_are_fans() {
+        let corners: Vec<[f64; 2]> = (0..9)
+            .map(|k| libm::sincos(f64::from(k) * std::f64::consts::TAU / 9.0))
+            .map(|(y, x)| [x, y])
+            .collect();
+        assert_eq!(triangulate_face(&tilted(&corners), &mut 1000), None);
+        let bent = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.5), DVec3::Y];
+        assert_eq!(triangulate_face(&bent, &mut 1000), None);
+        let flat = [0.0, 1.0, 2.0, 1.0, 2.0].map(|x| DVec3::X * x);
+        assert_eq!(triangulate_face(&flat, &mut 1000), None);
+        assert_eq!(triangulate_face(&[DVec3::NAN; 5], &mut 1000), None);
+    }
+
+    #[test]
+    fn faces_of_any_shape_keep_their_edges() {
+        for seed in 0..200 {
+            let mut random = Random::new(seed);
+            let count = 4 + random.below(20);
+            let corners: Vec<DVec3> = (0..count)
+                .map(|_| {
+                    DVec3::new(random.unit(), random.unit(), 0.1 * random.unit()).map(|x| (x * 6.0).round())
+                })
+                .collect();
+            face_area(&corners);
+        }
+    }
+
+    #[test]
+    fn the_effort_for_a_face_is_bounded() {
+        let mut random = Random::new(5);
+        let corners: Vec<DVec3> =
+            (0..20_000).map(|_| DVec3::new(random.unit(), random.unit(), 0.0)).collect();
+        let mut effort = 1_000_000;
+        assert_eq!(triangulate_face(&corners, &mut effort).map(|found| found.len()), Some(19_998));
+        assert_eq!(effort, 0);
     }
 
     #[test]

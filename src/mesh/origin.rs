@@ -68,6 +68,11 @@ impl WorldPositions {
         self.nearest.len()
     }
 
+    /// Returns position `v` in world space.
+    pub fn at(&self, v: usize) -> DVec3 {
+        self.nearest[v].as_dvec3() + self.left.get(v).copied().unwrap_or_default().as_dvec3()
+    }
+
     /// Returns whether there is no position.
     pub fn is_empty(&self) -> bool {
         self.nearest.is_empty()

@@ -33,6 +33,8 @@ mod large_volumes;
 mod merge_and_split;
 mod mesh_edits;
 mod mesh_files;
+mod mesh_oddities;
+mod mesh_spaces;
 mod multires;
 mod multires_fuzz;
 mod plane_cut;

@@ -1,6 +1,6 @@
 /** Worker that reads formats of other programs (DICOM, TIFF) and writes them as files that all labs read. */
 import init, { Volume, type VolumeInit } from 'vesicle';
-import { type DicomVolume, openDicom } from 'vesicle/dicom';
+import { type Decoders, type DicomVolume, openDicom } from 'vesicle/dicom';
 import { openTiff } from 'vesicle/tiff';
 import type { FileNotes, NamedBytes } from '../protocol';
 import { type Label, newLabel } from '../segment/labels';
@@ -19,7 +19,22 @@ interface Listed {
 
 let listed: Listed[] = [];
 
-const decoders = new URL('./dicom', pageAddress());
+const beside = (file: string) => new URL(`./dicom/${file}`, pageAddress());
+
+/** Decoders of compressed DICOM images, each loaded with the first image that needs it. */
+const decoders: Decoders = {
+  jpeg: {
+    load: () => import('@cornerstonejs/codec-libjpeg-turbo-8bit/decodewasmjs'),
+    wasm: beside('libjpegturbowasm_decode.wasm'),
+  },
+  jpegLossless: { load: () => import('@cornerstonejs/jpeg-lossless-decoder-js') },
+  jpegLs: { load: () => import('@cornerstonejs/codec-charls/decodewasmjs'), wasm: beside('charlswasm_decode.wasm') },
+  jpeg2000: {
+    load: () => import('@cornerstonejs/codec-openjpeg/decodewasmjs'),
+    wasm: beside('openjpegwasm_decode.wasm'),
+  },
+  htj2k: { load: () => import('@cornerstonejs/codec-openjph/wasmjs'), wasm: beside('openjphjs.wasm') },
+};
 
 /** Returns the address of the page: the worker's own file is in a subfolder of the built page. */
 function pageAddress(): string {

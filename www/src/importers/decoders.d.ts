@@ -1,4 +1,4 @@
-// The decoders, which have no declarations of their own; see `codecs.ts` for what is used of them.
+/** Decoders of images, which have no declarations of their own; `vesicle/dicom` checks what it uses of them. */
 declare module '@cornerstonejs/codec-libjpeg-turbo-8bit/decodewasmjs';
 declare module '@cornerstonejs/codec-charls/decodewasmjs';
 declare module '@cornerstonejs/codec-openjpeg/decodewasmjs';
