@@ -14,6 +14,7 @@ import type {
   MeshReport,
   ParamSpec,
   PointArray,
+  Space,
   StepReport,
   UncoveredRegion,
   Vec3,
@@ -32,6 +33,7 @@ export type {
   MeshReport,
   ParamSpec,
   PointArray,
+  Space,
   StepReport,
   UncoveredRegion,
   Vec3,
@@ -217,6 +219,8 @@ export interface Loaded extends Ready {
   volume: VolumeView;
   /** Number of pyramid levels of the model: those asked for, or as many as the volume allows. */
   levels: number;
+  /** Number of labels, if the volume looks like a label map; else 0. */
+  labels?: number;
 }
 
 export interface CodeRequest {
@@ -246,6 +250,11 @@ export interface ExportRequest {
   recentre?: boolean;
   /** Warnings that the file is to have in comments, besides those of the mesh. */
   warnings?: readonly Warning[];
+  /** Directions of the axes of the surface, and of those in the file, if they are to be others. */
+  space?: Space;
+  as?: Space;
+  /** Length of a unit of its positions. */
+  unit?: LengthUnit;
 }
 
 /** Requests of the page to the workers of all labs whose model runs. */

@@ -25,6 +25,7 @@ import type {
   VolumeView,
   WorkerEvent,
 } from './protocol';
+import { labelsLike } from './segment/likeness';
 import { text } from './texts';
 import { toCode } from './worker/code';
 import { compare } from './worker/compare';
@@ -137,7 +138,8 @@ class Session {
       this.#origin = { files, frame: frames > 1 ? frame : undefined, volume };
       this.#window = view.window;
       this.#inverted = view.inverted === true;
-      return withTransfer({ ...ready, volume: view, levels: fitting.levels }, [view.voxels]);
+      const labels = 'files' in source && source.files.length === 1 ? labelsLike(view.voxels) : 0;
+      return withTransfer({ ...ready, volume: view, levels: fitting.levels, labels }, [view.voxels]);
     } catch (error) {
       volume.free();
       throw error;
@@ -292,8 +294,8 @@ class Session {
     this.#done = false;
   }
 
-  #export({ format, recentre = false, warnings = [] }: ExportRequest): Uint8Array {
-    const bytes = this.#current().mesh.toBytes(format, { recentre, warnings });
+  #export({ format, ...options }: ExportRequest): Uint8Array {
+    const bytes = this.#current().mesh.toBytes(format, options);
     return withTransfer(bytes, [bytes]);
   }
 

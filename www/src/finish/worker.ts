@@ -157,7 +157,7 @@ const handlers: Handlers<Requests> = {
   edit,
   undo: () => travel(-1),
   redo: () => travel(1),
-  export: ({ format, recentre = false, warnings = [] }) => current().mesh.toBytes(format, { recentre, warnings }),
+  export: ({ format, ...options }) => current().mesh.toBytes(format, options),
   section: (plane) => sectionOf(current().mesh, plane),
   measure,
   reference: readReference,

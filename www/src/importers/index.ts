@@ -7,7 +7,7 @@ import type { FileNotes } from '../protocol';
 import { text } from '../texts';
 import { setName } from '../ui/folders';
 import { type Chosen, VolumeChoice } from '../ui/volume-choice';
-import { groupFiles } from '../worker/file-groups';
+import { groupFiles, isVolumeFile } from '../worker/file-groups';
 import { ImportClient } from './client';
 import type { Candidate, Listing } from './protocol';
 import { HEAD, isDicom, isTiff } from './recognise';
@@ -45,20 +45,15 @@ async function foreignAmong(files: File[]): Promise<File[]> {
   return dicom.length > 0 || !heads.every(isTiff) ? dicom : files;
 }
 
-/** Endings of files with volumes, or with the headers of some. */
-const HEADERS = /\.(nii(\.gz)?|nrrd|nhdr|mha|mhd|hdr)$/i;
-
 /** Returns the files of one volume among several; asks which one. Files of other kinds beside it are left out. */
 async function oneOf(files: File[]): Promise<File[] | undefined> {
-  const byName = new Map(files.map((file) => [file.name, file]));
-  const all = groupFiles(files.map(({ name }) => ({ name, bytes: new Uint8Array() })));
-  const groups = all.filter(([first]) => HEADERS.test(first?.name ?? ''));
+  if (!files.some(isVolumeFile)) return files;
+  const groups = groupFiles(files);
   const [only] = groups;
-  if (!only) return files;
-  if (groups.length === 1) return all.length === 1 ? files : only.flatMap(({ name }) => byName.get(name) ?? []);
+  if (groups.length === 1) return only?.length === files.length ? files : only;
   const candidates = groups.map(([first], id) => nativeCandidate(first?.name ?? '', id));
   const chosen = await new VolumeChoice(text('importing.oneOfFiles')).choose({ candidates, skipped: [] });
-  return chosen && groups[chosen.ids[0] ?? 0]?.flatMap(({ name }) => byName.get(name) ?? []);
+  return chosen && groups[chosen.ids[0] ?? 0];
 }
 
 function nativeCandidate(name: string, id: number): Candidate {

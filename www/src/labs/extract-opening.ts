@@ -129,9 +129,9 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
 
   protected async adopt(opened: OpenedVolume, source: ExtractSource, reopening: boolean): Promise<void> {
     if (reopening) return this.#takeUp(opened, source);
-    const { volume, choice, params, setup, moments } = opened;
+    const { volume, choice, params, setup, moments, labels = 0 } = opened;
     this.states.ready = true;
-    this.#ui.adopt(volume, source);
+    this.#ui.adopt(volume, source, labels);
     if (source.linked?.color) this.#ui.options.set({ color: source.linked.color });
     this.#settings.adopt(volume, choice, params, setup.attractors);
     if (moments) return this.#resume(moments, source.session?.content.view);

@@ -1,4 +1,4 @@
-import { EXAMPLES, type Example, type Unit } from '../examples';
+import { EXAMPLES, type Example } from '../examples';
 import { PRESETS } from '../presets';
 import type { VolumeView } from '../protocol';
 import { text } from '../texts';
@@ -40,9 +40,4 @@ export function factsOf({ name, dims, spacing, range, large, frames, remarks = [
   if (large) facts.push([text('extract.factLevels'), large.levels.map((level) => level.join(' × ')).join(', ')]);
   if (frames > 1) facts.push([text('labs.frames'), count(frames)]);
   return [...facts, ...remarks.map((remark): Fact => [text('labs.factNote'), remark])];
-}
-
-/** Returns the unit of lengths that a volume's file states, or else that of most such files. */
-export function unitOf({ unit = 'mm' }: VolumeView): Unit {
-  return unit === 'um' ? 'µm' : unit;
 }

@@ -13,6 +13,7 @@ import { fileChooser } from '../ui/files';
 import { FrameChoice } from '../ui/frame-choice';
 import { Histogram } from '../ui/histogram';
 import type { History } from '../ui/history';
+import { LabelsOffer } from '../ui/labels-offer';
 import { LargeSourceControls } from '../ui/large-source';
 import { EventLog } from '../ui/log';
 import { MeasurePanel } from '../ui/measures';
@@ -23,8 +24,9 @@ import { TimeTable } from '../ui/times';
 import { EXTRACT_OPTIONS, OptionControls, type ViewOptions } from '../ui/view-options';
 import { Stage } from '../view/stage';
 import { type ExtractSource, frameOf } from './extract-opening';
-import { extractData, factsOf, unitOf } from './extract-page';
+import { extractData, factsOf } from './extract-page';
 import { type FetchMesh, type RunEvents, RunParts } from './lab-parts';
+import { spaceOf, unitOf } from './surface-space';
 
 const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, color: 'plain', slices: 'walls' };
 
@@ -41,11 +43,13 @@ export interface PartEvents extends RunEvents<Example> {
   onCoverage: () => void;
   onCancelCoverage: () => void;
   onSeed: () => void;
+  onSegment: () => void;
   onSculpt: () => void;
 }
 
 /** Controls and views of the Extract lab. */
 export class ExtractParts extends RunParts<Example> {
+  readonly #labels: LabelsOffer;
   readonly #slices = h('div', { class: 'slices' });
   readonly stage: Stage;
   readonly measures = new MeasurePanel();
@@ -83,6 +87,7 @@ export class ExtractParts extends RunParts<Example> {
     });
     this.large = large;
     this.#frames = frames;
+    this.#labels = new LabelsOffer(events.onSegment);
     this.stage = new Stage(this.canvas, this.#slices, INITIAL_VIEW, events.onPlanes);
     this.#figure = new FigurePanel<Variant, Preset>(events.onVariant);
     this.histogram = new Histogram((iso) => events.onParam('iso', iso));
@@ -120,7 +125,7 @@ export class ExtractParts extends RunParts<Example> {
       over: [this.stage.legend.element, this.stage.editing.legend.element],
       stage: (view, status) => [view, this.transport.element, status, this.#slices],
       setup: [
-        section(text('extract.sectionData'), this.data.element, this.#figure.element),
+        section(text('extract.sectionData'), this.data.element, this.#labels.element, this.#figure.element),
         section(text('extract.sectionIntensities'), this.histogram.element),
         section(text('extract.sectionStart'), this.start.element),
         section(text('extract.sectionPyramid'), this.pyramid.element),
@@ -141,14 +146,16 @@ export class ExtractParts extends RunParts<Example> {
   }
 
   /** Shows a newly opened volume, and clears results of the previous one. */
-  adopt(volume: VolumeView, source: ExtractSource): void {
+  adopt(volume: VolumeView, source: ExtractSource, labels: number): void {
     const { example, unit = unitOf(volume) } = source;
+    this.#labels.show(example ? 0 : labels);
     this.saving.name = volume.name;
     this.warnings.showData(source.warnings, volume.warnings);
     const shown = example?.unit ?? unit;
     this.measures.unit = shown;
     this.stage.unit = shown;
     this.unit = shown;
+    this.surfaceSpace = spaceOf(volume, shown);
     this.histogram.setVolume(volume);
     this.data.show(factsOf(volume, shown), example);
     this.#frameCount = volume.frames;

@@ -75,8 +75,16 @@ export class ExtractLab extends RunLab<Example> {
       onCoverage: () => void this.#measureCoverage(),
       onCancelCoverage: () => this.ask(this.client.request('cancelCoverage', undefined)),
       onSeed: () => void this.#settings.seed(),
+      onSegment: () => this.ask(this.#toSegment()),
       onSculpt: () => this.toSculpt(this.ui.surfaceFile({ format: 'ply' })),
     };
+  }
+
+  /** Opens the volume's file in the Segment lab. */
+  async #toSegment(): Promise<void> {
+    const { source } = this.opening;
+    const [file] = source ? this.opening.filesOf(await source.load()) : [];
+    if (file) this.passOn({ lab: 'segment', ...file, params: {} });
   }
 
   protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {

@@ -20,6 +20,7 @@ import { WarningList } from '../ui/warnings';
 import type { Warning } from '../warnings';
 import type { ExamplePanel, Listed } from './example-panel';
 import { Saving } from './saving';
+import type { SurfaceSpace } from './surface-space';
 
 /** The user's actions that all labs have. */
 export interface LabEvents<Example> extends SessionEvents {
@@ -212,6 +213,7 @@ export abstract class LabParts<Example extends Listed> {
 export abstract class RunParts<Example extends Listed> extends LabParts<Example> {
   readonly transport: Transport;
   protected readonly exports: ExportButtons;
+  #space: SurfaceSpace = {};
   readonly csv: HTMLButtonElement;
   protected readonly history: History;
   readonly #fetchMesh: FetchMesh;
@@ -244,6 +246,16 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     return super.unit;
   }
 
+  /** Directions of the axes of the surface, and the length of a unit, if these are known: files of it state them. */
+  get surfaceSpace(): SurfaceSpace {
+    return this.#space;
+  }
+
+  set surfaceSpace(space: SurfaceSpace) {
+    this.#space = space;
+    this.exports.space = space.space;
+  }
+
   override set unit(unit: Unit) {
     super.unit = unit;
     if (this.finish) this.finish.unit = unit;
@@ -251,7 +263,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
 
   /** Returns the surface, edited if it is, as a file. */
   surfaceFile(given: ExportRequest): Promise<Uint8Array> {
-    const request = { ...given, warnings: this.surfaceWarnings };
+    const request = { ...given, ...this.#space, warnings: this.surfaceWarnings };
     return this.finish?.exported(request) ?? this.#fetchMesh(request);
   }
 
@@ -279,7 +291,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   protected finishSections(view: EditedView, measures: MeasurePanel, onOpen = () => {}): HTMLElement[] {
     const mesh = () => {
       onOpen();
-      return this.#fetchMesh({ format: 'ply' });
+      return this.#fetchMesh({ format: 'ply', ...this.#space });
     };
     this.#edited = view;
     this.finish = new Finish({

@@ -8,7 +8,7 @@ import { readFiles } from '../ui/files';
 import { fetched } from './downloads';
 
 /** File extensions that the Sculpt lab opens, for the browser's file dialog. */
-export const ACCEPT = '.glb,.obj,.ply,.stl,.png,.jpg,.jpeg,.webp';
+export const ACCEPT = '.glb,.gltf,.bin,.obj,.ply,.stl,.png,.jpg,.jpeg,.webp';
 
 /** Media types of texture images by file extension. */
 const PICTURES: [RegExp, MeshTexture['type']][] = [
@@ -33,6 +33,8 @@ async function fetchMesh(mesh: ExampleMesh): Promise<MeshSource> {
  * the smaller one its base. Throws if there is no mesh, or more files than the lab can use.
  */
 export async function fromFiles(files: File[]): Promise<SceneSource> {
+  const document = files.find(({ name }) => /\.gltf$/i.test(name));
+  if (document) return fromDocument(document, files);
   const pictures = files.filter(({ name }) => typeOf(name));
   const meshes = files.filter((file) => !pictures.includes(file));
   if (meshes.length === 0) throw new Error(text('sculpt.textureNeedsMesh'));
@@ -45,6 +47,13 @@ export async function fromFiles(files: File[]): Promise<SceneSource> {
     ...(detail && { detail: { file: detail, ...(texture && { texture }) } }),
     ...(base && { base: { file: base } }),
   };
+}
+
+/** Reads a glTF document, with the buffers and images beside it. */
+async function fromDocument(document: File, files: File[]): Promise<SceneSource> {
+  const beside = files.filter((file) => file !== document);
+  const [[file], others] = await Promise.all([readFiles([document]), readFiles(beside)]);
+  return file ? { detail: { file, beside: others } } : {};
 }
 
 function typeOf(name: string): MeshTexture['type'] | undefined {

@@ -5,6 +5,7 @@ import type { ImageSource, LabelArray, NamedBytes, OpenedImage, ParamSpec } from
 import { nameOf, readFiles } from '../ui/files';
 import { fetchBytes } from './downloads';
 import type { LabStates } from './lab-states';
+import type { Handoff } from './labs';
 import { Opening, type Source } from './opening';
 import { fromHash, type LinkedSegment } from './segment-link';
 import type { SegmentParts } from './segment-parts';
@@ -37,6 +38,11 @@ export class SegmentOpening extends Opening<SegmentExample, LinkedSegment, Image
   /** Opens the present source again, with its own label map. */
   async again(): Promise<void> {
     if (this.source) await this.open(this.source);
+  }
+
+  /** Opens a label map that another lab passes on. */
+  override passedOn({ name, bytes, warnings = [] }: Handoff): Promise<void> {
+    return this.open({ name, load: async () => ({ files: [{ name, bytes }] }), warnings });
   }
 
   protected find(id: string): SegmentExample | undefined {

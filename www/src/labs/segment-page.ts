@@ -3,6 +3,7 @@ import type { OpenedImage } from '../segment/protocol';
 import { text } from '../texts';
 import { lengths, milliseconds } from '../ui/format';
 import { ExamplePanel, type Fact } from './example-panel';
+import { unitOf } from './surface-space';
 
 /** Name of the fact that tells where the label map is from. */
 export const MAP_FACT = text('segment.factMap');
@@ -37,7 +38,7 @@ export function factsOf(
     [text('labs.factFile'), volume.name],
     [MAP_FACT, labelFile ?? (example?.labelling ? text('segment.computedMap') : text('segment.emptyMap'))],
     [text('extract.factVoxels'), volume.dims.join(' × ')],
-    [text('labs.factVoxelSize'), lengths(sizes, example?.unit ?? 'mm')],
+    [text('labs.factVoxelSize'), lengths(sizes, example?.unit ?? unitOf(volume))],
     [text('segment.factSurfaces'), milliseconds(duration)],
     ...(volume.remarks ?? []).map((remark): Fact => [text('labs.factNote'), remark]),
   ];

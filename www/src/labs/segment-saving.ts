@@ -1,6 +1,7 @@
 /** Saves label map and surfaces of the Segment lab as files. */
 
 import { zipSync } from 'three/addons/libs/fflate.module.js';
+import type { ExportRequest } from '../protocol';
 import type { SegmentClient } from '../segment/client';
 import type { Label } from '../segment/labels';
 import type { VolumeFormat } from '../segment/protocol';
@@ -32,23 +33,22 @@ export async function saveMap(
  * format, one a label, in a ZIP archive; `recentre` moves them to the origin, as all have the same.
  */
 export async function saveSurfaces(
-  format: SurfaceFormat,
+  { format, recentre = false, ...frame }: Omit<ExportRequest, 'format'> & { format: SurfaceFormat },
   client: SegmentClient,
   { saving, warnings: { all } }: { saving: Saving; warnings: { all: readonly Warning[] } },
   labels: readonly Label[],
   surfaces: ReturnType<SegmentView['surfaces']>,
-  recentre = false,
 ): Promise<void> {
   if (format === 'glb') {
     const { toGlb } = await import('../segment/glb');
-    return saving.bytes('glb', await toGlb(labels, surfaces, all), 'model/gltf-binary', '-labels');
+    return saving.bytes('glb', await toGlb(labels, surfaces, all, frame), 'model/gltf-binary', '-labels');
   }
   const files: Record<string, Uint8Array> = {};
   for (const { value, name } of labels) {
     if (!surfaces.has(value)) continue;
     const body = { value, format, warnings: concerning(all, { label: value }) };
     const stem = `${value}-${name.replace(/[^\p{L}\p{N}]+/gu, '-')}`;
-    files[`${stem}.${format}`] = await client.request('exportMesh', { ...body, recentre });
+    files[`${stem}.${format}`] = await client.request('exportMesh', { ...body, ...frame, recentre });
   }
   saving.bytes('zip', zipSync(files, { level: 1 }), 'application/zip', `-${format}${recentre ? RECENTRED : ''}`);
 }

@@ -29,6 +29,7 @@ import { factsOf, MAP_FACT } from './segment-page';
 import { type PartEvents, SegmentParts, type SurfaceFormat } from './segment-parts';
 import { saveMap, saveSurfaces } from './segment-saving';
 import { sessionOf } from './segment-session';
+import { spaceOf, unitOf } from './surface-space';
 
 /** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
 const MASK_DELAY = 120;
@@ -165,7 +166,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
     this.ui.saving.name = example?.id ?? name;
     this.#params = params;
     this.ui.data.show(factsOf(opened, example), example);
-    this.ui.unit = example?.unit ?? 'mm';
+    this.ui.unit = example?.unit ?? unitOf(volume);
     this.ui.showParams(params);
     this.#forgetMask();
     this.ui.view.setVolume(volume, { dims: volume.dims, voxels, ...NO_OVERLAYS });
@@ -413,7 +414,8 @@ export class SegmentLab extends LabShell<SegmentExample> {
   #saveSurfaces(format: SurfaceFormat, recentre = false): void {
     this.ui.offer.hide();
     const surfaces = this.ui.view.surfaces();
-    const saving = saveSurfaces(format, this.client, this.ui, this.#editing.labels, surfaces, recentre);
+    const space = this.#volume ? spaceOf(this.#volume, this.ui.unit) : {};
+    const saving = saveSurfaces({ format, recentre, ...space }, this.client, this.ui, this.#editing.labels, surfaces);
     const offering = saving.catch((error) => {
       const [first] = surfaces.values();
       if (toFailure(error).code !== 'precision' || !first) throw error;

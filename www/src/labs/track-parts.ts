@@ -23,6 +23,7 @@ import { VolumeCurve } from '../ui/volume-curve';
 import { TrackView, type TrackViewOptions } from '../view/track';
 import { concerning, type Warning } from '../warnings';
 import { type RunEvents, RunParts } from './lab-parts';
+import { spaceOf, unitOf } from './surface-space';
 import { TRACK_ROWS } from './track-measures';
 import { factsOf, imageData } from './track-page';
 
@@ -157,10 +158,11 @@ export class TrackParts extends RunParts<TrackExample> {
 
   /** Shows the facts about a newly opened image. */
   adopt(opened: OpenedImage, example: TrackExample | undefined, name: string): void {
-    const unit = example?.unit ?? 'mm';
+    const unit = example?.unit ?? unitOf(opened.volume);
     this.saving.name = example?.id ?? name;
     this.measures.unit = unit;
     this.unit = unit;
+    this.surfaceSpace = spaceOf(opened.volume, unit);
     this.data.show(factsOf(opened, name, unit), example);
   }
 

@@ -2,8 +2,16 @@ import { zipSync } from 'three/addons/libs/fflate.module.js';
 import type { TrackClient } from '../track/client';
 import { concerning, type Warning } from '../warnings';
 import type { Saving } from './saving';
+import type { SurfaceSpace } from './surface-space';
 import { framesCsv } from './track-measures';
 import type { TrackResults } from './track-results';
+
+/** What a lab's page knows of its surfaces, and how it saves files. */
+interface Saver {
+  saving: Saving;
+  surfaceSpace: SurfaceSpace;
+  warnings: { all: readonly Warning[] };
+}
 
 /**
  * Saves all tracked frames: their surfaces as PLY files in one ZIP archive, as one animation, or their measures as a
@@ -12,20 +20,31 @@ import type { TrackResults } from './track-results';
 export async function saveTrack(
   what: 'frames' | 'animation' | 'table',
   client: TrackClient,
-  { saving, warnings: { all } }: { saving: Saving; warnings: { all: readonly Warning[] } },
+  { saving, surfaceSpace, warnings: { all } }: Saver,
   { frames, truth }: TrackResults,
 ): Promise<void> {
   if (what === 'table') saving.bytes('csv', new TextEncoder().encode(framesCsv(frames, truth, all)), 'text/csv');
-  else if (what === 'animation') saving.bytes('glb', await client.request('animation', undefined), 'model/gltf-binary');
-  else saving.bytes('zip', await archive(frames.length, client, all), 'application/zip');
+  else if (what === 'animation')
+    saving.bytes('glb', await client.request('animation', surfaceSpace), 'model/gltf-binary');
+  else saving.bytes('zip', await archive(frames.length, client, surfaceSpace, all), 'application/zip');
 }
 
-async function archive(frames: number, client: TrackClient, all: readonly Warning[]): Promise<Uint8Array> {
+async function archive(
+  frames: number,
+  client: TrackClient,
+  space: SurfaceSpace,
+  all: readonly Warning[],
+): Promise<Uint8Array> {
   const files: Record<string, Uint8Array> = {};
   const digits = String(frames).length;
   for (let frame = 0; frame < frames; frame++) {
     const name = `frame-${String(frame + 1).padStart(digits, '0')}.ply`;
-    files[name] = await client.request('export', { frame, format: 'ply', warnings: concerning(all, { frame }) });
+    files[name] = await client.request('export', {
+      ...space,
+      frame,
+      format: 'ply',
+      warnings: concerning(all, { frame }),
+    });
   }
   // Fast compression: coordinates hardly compress anyway.
   return zipSync(files, { level: 1 });

@@ -16,6 +16,7 @@ import type { TrackViewOptions } from '../view/track';
 import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { OpenInLab } from './labs';
+import { unitOf } from './surface-space';
 import { compareWith } from './track-comparing';
 import { linkOf, toHash } from './track-link';
 import { type OpenedTrack, TrackOpening, type TrackSource } from './track-opening';
@@ -105,7 +106,7 @@ export class TrackLab extends RunLab<TrackExample> {
     this.states.ready = true;
     this.#slices = opened.dims[2];
     this.#truth = opened.truth;
-    this.#results.unit = example?.unit ?? 'mm';
+    this.#results.unit = example?.unit ?? unitOf(opened.volume);
     this.ui.adopt(opened, example, name);
     this.#takeVolume(opened.volume, false);
     this.#settings.adopt(setup, { ...opened, volume: undefined });

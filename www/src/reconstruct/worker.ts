@@ -75,7 +75,7 @@ class Session {
       return toCode(this.#log.log, (setup) => programOf(setup, data, stem), edits);
     },
     data: () => ({ extension: 'xyz', bytes: pointsFile(this.#file, this.#points().points) }),
-    export: ({ format, recentre = false }) => this.#current().mesh.toBytes(format, { recentre }),
+    export: ({ format, ...options }) => this.#current().mesh.toBytes(format, options),
     volume: ({ size }) => this.#volume(size),
     quantity: (quantity) => this.#setQuantity(quantity),
     timing: (body) => this.#time(body),

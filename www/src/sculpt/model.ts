@@ -42,7 +42,7 @@ export async function sceneFrom({ detail, base }: SceneSource): Promise<Scene> {
 
 async function meshFrom(source: MeshSource): Promise<Mesh> {
   if ('shape' in source) return computedMesh(source.shape);
-  return readMesh(source.file.bytes, source.texture);
+  return readMesh(source.file.bytes, source.texture, source.beside);
 }
 
 export function freeScene({ detail, base }: Scene): void {

@@ -32,7 +32,7 @@ export type { ControlEllipsoid, Failure, MeshTexture, NamedBytes, ParamSpec, Par
 export type Pose = ControlEllipsoid[];
 
 /** Source of a mesh: a file with its texture, if any, or a computed shape. */
-export type MeshSource = { file: NamedBytes; texture?: MeshTexture } | { shape: ComputedMesh };
+export type MeshSource = { file: NamedBytes; texture?: MeshTexture; beside?: NamedBytes[] } | { shape: ComputedMesh };
 
 /** Meshes that a model is built from; with neither detail nor base it is a membrane over the ellipsoids alone. */
 export interface SceneSource {

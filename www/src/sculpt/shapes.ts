@@ -2,6 +2,7 @@
 import { Mesh, type MeshTexture } from 'vesicle';
 import startReaders, { parseMesh } from 'vesicle/import';
 import { drawnMap } from './map';
+import type { NamedBytes } from './protocol';
 
 export type ComputedMesh = 'globe' | 'ball';
 
@@ -23,10 +24,11 @@ export async function plainMesh(shape: ComputedMesh): Promise<Mesh> {
   return shape === 'ball' ? Mesh.icosphere([...BALL[0]], BALL[1], BALL[2]) : readMesh(globeAsObj());
 }
 
-/** Reads a mesh from the bytes of a file, with the image of its texture if that is a file of its own. */
-export async function readMesh(bytes: Uint8Array, texture?: MeshTexture): Promise<Mesh> {
+/** Reads a mesh from the bytes of a file, with the image of its texture and the files beside it, if these are its own. */
+export async function readMesh(bytes: Uint8Array, texture?: MeshTexture, files: NamedBytes[] = []): Promise<Mesh> {
   await startReaders();
-  const { positions, indices, ...extra } = parseMesh(bytes, texture && { texture });
+  const beside = files.map(({ name, bytes }) => ({ name, bytes }));
+  const { positions, indices, ...extra } = parseMesh(bytes, { ...(texture && { texture }), files: beside });
   return Mesh.fromArrays(positions, indices, extra);
 }
 

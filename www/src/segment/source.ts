@@ -9,6 +9,7 @@ import { Refusal } from '../worker/refusal';
 import { readFiles } from '../worker/volumes';
 import { labelHead, labelTooth } from './labelling';
 import type { KnownLabel } from './labels';
+import { labelsLike } from './likeness';
 import type { ImageSource, LabelArray, Labelling, NamedBytes, Vec3 } from './protocol';
 import { labelsIn } from './slicer';
 
@@ -80,13 +81,13 @@ interface NamedVolume {
   isCropped: boolean;
 }
 
-/** Reads the volume and, if the files contain two, the label map; one that names its labels is both. */
+/** Reads the volume and, if the files contain two, the label map; one that names its labels, or looks like a map, is both. */
 async function readBoth(files: NamedBytes[]): Promise<[NamedVolume, NamedVolume?]> {
   const groups = groupFiles(files);
   if (groups.length > 2) throw new Refusal('bad-file', text('segment.atMostTwo', { count: groups.length }));
   const [first, second] = await Promise.all(groups.map(readMap));
   if (!first) throw new Refusal('bad-file', text('files.noFile'));
-  if (!second) return first.known.length > 0 ? [first, first] : [first];
+  if (!second) return first.known.length > 0 || labelsLike(first.init.data) > 0 ? [first, first] : [first];
   return isMap(first, second) ? [second, first] : [first, second];
 }
 

@@ -134,8 +134,7 @@ class Session {
       const file = map.toBytes(format, { gzip: true });
       return format === 'nrrd' ? withLabels(file, labels, map.dims) : file;
     },
-    exportMesh: ({ value, format, recentre = false, warnings = [] }) =>
-      this.#current().surfaces.mesh(value).toBytes(format, { recentre, warnings }),
+    exportMesh: ({ value, format, ...options }) => this.#current().surfaces.mesh(value).toBytes(format, options),
   };
 
   async #openImage({ name, source, params, labels, state }: Requests['open']['body']): Promise<OpenedImage> {

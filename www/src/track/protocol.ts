@@ -204,7 +204,7 @@ export interface Requests extends CodeRequests {
   sendState: { body: undefined; reply: undefined };
   export: { body: ExportRequest & { frame: number }; reply: Uint8Array };
   /** Replies with all tracked frames as one animated GLB. */
-  animation: { body: undefined; reply: Uint8Array };
+  animation: { body: Pick<ExportRequest, 'space' | 'unit'>; reply: Uint8Array };
   /** Tracks all frames with another setup, for comparison; replies with undefined if cancelled. */
   compare: { body: { setup: Setup }; reply: ComparedTrack | undefined };
   cancelCompare: { body: undefined; reply: undefined };

@@ -83,7 +83,7 @@ class Session {
     view: () => this.#view(),
     sendState: () => this.#reportStopped(),
     export: (body) => this.#export(body),
-    animation: () => this.#current().toGlb(),
+    animation: (frame) => this.#current().toGlb(frame),
     compare: ({ setup }) => this.#compare(setup),
     cancelCompare: () => this.#comparison.stop(),
     code: (body) => this.#code(body),
@@ -306,10 +306,10 @@ class Session {
     return toCode(this.#log.log, program, edits);
   }
 
-  #export({ frame, format, recentre = false, warnings = [] }: Requests['export']['body']): Uint8Array {
+  #export({ frame, format, ...options }: Requests['export']['body']): Uint8Array {
     const mesh = this.#current().meshAt(frame);
     try {
-      return mesh.toBytes(format, { recentre, warnings });
+      return mesh.toBytes(format, options);
     } finally {
       mesh.free();
     }

@@ -1,6 +1,6 @@
-import type { ExportRequest, Vec3 } from '../protocol';
+import type { ExportRequest, Space, Vec3 } from '../protocol';
 import { text } from '../texts';
-import { h } from './dom';
+import { h, uniqueId } from './dom';
 
 type MeshFormat = ExportRequest['format'];
 
@@ -49,6 +49,8 @@ export class ExportButtons {
   readonly element: HTMLElement;
   readonly #buttons: HTMLButtonElement[];
   readonly #offer = new RecentreOffer();
+  readonly #axes = h('select', { 'data-export-axes': true });
+  readonly #axesRow: HTMLElement;
   readonly #onExport: (request: ExportRequest, type: string) => void;
 
   /** `onExport` is called again for a surface that is to be moved to the origin, after an {@link offer}. */
@@ -63,19 +65,39 @@ export class ExportButtons {
       };
       const onclick = () => {
         this.#offer.hide();
-        onExport({ format }, type);
+        onExport({ format, ...this.#as }, type);
       };
       return h('button', { ...attributes, onclick }, format.toUpperCase());
     });
-    this.element = h('div', {}, h('div', { class: 'buttons exports' }, ...this.#buttons), this.#offer.element);
+    this.#axes.id = uniqueId('axes');
+    this.#axesRow = h(
+      'div',
+      { class: 'row', hidden: true, title: text('controls.axesHelp') },
+      h('label', { for: this.#axes.id }, text('controls.axes')),
+      this.#axes,
+    );
+    const buttons = h('div', { class: 'buttons exports' }, ...this.#buttons);
+    this.element = h('div', {}, buttons, this.#axesRow, this.#offer.element);
   }
 
   /** Offers to save the surface relative to `origin`, since the format is too coarse for it where it is. */
   offer(format: MeshFormat, type: string, origin: Vec3): void {
     this.#offer.show(format, origin, () => {
       this.#offer.hide();
-      this.#onExport({ format, recentre: true }, type);
+      this.#onExport({ format, recentre: true, ...this.#as }, type);
     });
+  }
+
+  /** Directions of the axes of the surface, if these are known: the file may have others. */
+  set space(space: Space | undefined) {
+    this.#axesRow.hidden = space === undefined;
+    const spaces: Space[] = space === 'LPS' ? ['LPS', 'RAS'] : ['RAS', 'LPS'];
+    const label = (one: Space) => (one === space ? text('controls.axesOfData', { space: one }) : one);
+    this.#axes.replaceChildren(...spaces.map((one) => h('option', { value: one }, label(one))));
+  }
+
+  get #as(): Pick<ExportRequest, 'as'> {
+    return this.#axesRow.hidden ? {} : { as: this.#axes.value as Space };
   }
 
   set enabled(enabled: boolean) {

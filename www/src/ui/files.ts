@@ -7,7 +7,7 @@ import { type Dropped, readFolders } from './folders';
 export { nameOf } from './folders';
 
 /** Endings of files of volumes. */
-export const VOLUME_FILES = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.raw,.zraw,.dcm,.dicom,.ima,.tif,.tiff';
+export const VOLUME_FILES = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.hdr,.img,.raw,.zraw,.dcm,.dicom,.ima,.tif,.tiff';
 
 /**
  * Creates a button with the given label that chooses one file, or several that belong together, of the endings in `accept`,

@@ -6,14 +6,11 @@ import { shapeVoxels } from '../shapes';
 import { text } from '../texts';
 import { quantiles } from '../threshold';
 import { concerning, type Warning } from '../warnings';
+import { isHeader } from './file-groups';
 import { toNrrd } from './nrrd';
 import { Refusal } from './refusal';
 
 export const HISTOGRAM_BINS = 256;
-
-function isHeader({ name }: NamedBytes): boolean {
-  return /\.(nhdr|mhd)$/i.test(name);
-}
 
 /**
  * Parses a volume from one file; for a header without its voxels, throws a `Refusal` whose message requests the file
@@ -42,9 +39,12 @@ export async function readFiles(files: NamedBytes[]): Promise<VolumeInit> {
   const [first, second] = files;
   if (!first) throw new Refusal('bad-file', text('files.noFile'));
   if (!second) return withNotes(parseFile(first), first.notes);
-  if (files.length > 2) throw new Refusal('bad-file', text('files.notOneVolume', { count: files.length }));
-  const [header, data] = isHeader(second) && !isHeader(first) ? [second, first] : [first, second];
-  return parseVolume(header.bytes, { data: data.bytes });
+  const header = files.find(isHeader);
+  if (!header) throw new Refusal('bad-file', text('files.notOneVolume', { count: files.length }));
+  const others = files.filter((file) => file !== header);
+  // A single data file may have another name than its header says.
+  if (files.length === 2) return parseVolume(header.bytes, { data: (header === first ? second : first).bytes });
+  return parseVolume(header.bytes, { files: others.map(({ name, bytes }) => ({ name, bytes })) });
 }
 
 /** Returns a volume with what its file could not hold. */
@@ -128,7 +128,7 @@ export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
   // Quantiles, because a few extreme voxels (metal, noise) must not make all others grey.
   const [low = range[0], high = range[1]] = quantiles(histogram, range, [0.001, 0.999]);
   const window: [number, number] = high > low ? [low, high] : range;
-  const { dims, frames, spacing, affine, space, warnings } = volume;
+  const { dims, frames, spacing, affine, space, unit, warnings } = volume;
   return {
     name,
     dims,
@@ -136,6 +136,7 @@ export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
     spacing,
     affine,
     space,
+    ...(unit && { unit }),
     range,
     histogram,
     window,
