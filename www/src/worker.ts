@@ -138,7 +138,9 @@ class Session {
       this.#origin = { files, frame: frames > 1 ? frame : undefined, volume };
       this.#window = view.window;
       this.#inverted = view.inverted === true;
-      const labels = 'files' in source && source.files.length === 1 ? labelsLike(view.voxels) : 0;
+      const [file, second] = 'files' in source ? source.files : [];
+      // Of images of other programs it is known what they are.
+      const labels = file && !second && !file.notes ? labelsLike(view.voxels) : 0;
       return withTransfer({ ...ready, volume: view, levels: fitting.levels, labels }, [view.voxels]);
     } catch (error) {
       volume.free();

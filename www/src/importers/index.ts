@@ -5,7 +5,7 @@
  */
 import type { FileNotes } from '../protocol';
 import { text } from '../texts';
-import { setName } from '../ui/folders';
+import { hasName, setName } from '../ui/folders';
 import { type Chosen, VolumeChoice } from '../ui/volume-choice';
 import { groupFiles, isVolumeFile } from '../worker/file-groups';
 import { ImportClient } from './client';
@@ -50,7 +50,8 @@ async function oneOf(files: File[]): Promise<File[] | undefined> {
   if (!files.some(isVolumeFile)) return files;
   const groups = groupFiles(files);
   const [only] = groups;
-  if (groups.length === 1) return only?.length === files.length ? files : only;
+  // A folder's name stays, if nothing of it is left out.
+  if (groups.length === 1) return only?.length === files.length && hasName(files) ? files : only;
   const candidates = groups.map(([first], id) => nativeCandidate(first?.name ?? '', id));
   const chosen = await new VolumeChoice(text('importing.oneOfFiles')).choose({ candidates, skipped: [] });
   return chosen && groups[chosen.ids[0] ?? 0];

@@ -60,7 +60,8 @@ async function listTiff(files: File[]): Promise<Found> {
   const stem = files[0]?.name.replace(/(\.ome)?\.tiff?$/i, '') ?? '';
   const known = { kind: 'image', patient: '', modality: '', date: '', uneven: undefined, remarks: [] } as const;
   const candidates = channels.map(({ name }, channel): Listed => {
-    const own = channels.length > 1 ? `${stem}, ${text('importing.channel', { name })}` : stem;
+    const label = /^channel\b/i.test(name) ? name : text('importing.channel', { name });
+    const own = channels.length > 1 ? `${stem}, ${label}` : stem;
     const title = files.length === 1 ? (files[0]?.name ?? own) : own;
     const shown = {
       ...known,

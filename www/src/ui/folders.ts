@@ -15,6 +15,9 @@ export function nameOf(files: readonly File[]): string {
   return files.length > 1 ? text('controls.moreFiles', { first: first ?? '', more: files.length - 1 }) : (first ?? '');
 }
 
+/** Whether a set of files has a name besides those of its files. */
+export const hasName = (files: readonly File[]) => titles.has(files);
+
 /** Gives a set of files a name for display. */
 export function setName(files: readonly File[], name: string): void {
   titles.set(files, name);

@@ -75,7 +75,7 @@ export class VolumeChoice {
       const open = h('button', { type: 'submit', class: 'primary' }, text('importing.open'));
       const form = h(
         'form',
-        {},
+        { class: 'choice-form' },
         ...lists,
         resample.element,
         ...rest,
