@@ -65,7 +65,7 @@ export function evennessOf(slices: readonly Frame[]): Evenness {
   if (off <= UNNOTICED * step) return { kind: 'even' };
   return {
     kind: 'even',
-    note: `Slices are up to ${shown(off)} off equal distances of ${shown(step)}, and were taken for even.`,
+    note: `Slices are up to ${shown(off)} off equal distances of ${shown(step)}, and count as even.`,
   };
 }
 

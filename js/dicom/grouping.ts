@@ -7,7 +7,7 @@
  * 2. A file that is there twice, with the same unique identifier (C.12.1), counts once.
  * 3. Of several images at the same position, those that differ in what was measured (echo, b-value, magnitude and phase,
  *    reconstruction) are different volumes; those that differ in time are frames of one volume.
- * 4. Images at the same position that nothing tells apart are not read, since which one is right is unknown.
+ * 4. Images at the same position without any such difference are not read, since the right one is unknown.
  */
 import type { Vec3 } from '../data.js';
 import { cross, dot, evennessOf } from './geometry.js';
@@ -41,11 +41,11 @@ const CLOCKS = ['trigger time', 'frame reference time', 'acquisition time', 'con
 /** The slices of a volume: of each of its frames, sorted along the normal. */
 export interface Stack {
   frames: Frame[][];
-  /** What tells this volume from others of its series; empty if there are none. */
+  /** Attribute that differs from other volumes of the series; empty if there are none. */
   label: string;
-  /** What should be known before relying on it. */
+  /** Warnings about the volume. */
   notes: string[];
-  /** What else is known of it. */
+  /** Facts about the volume that are no reason to doubt it. */
   remarks?: string[];
 }
 
@@ -130,7 +130,11 @@ function separated(images: Frame[], label: string): (Stack | Conflict)[] {
     const parts = byKind(images, most) ?? undefined;
     if (parts) return parts.flatMap(([name, part]) => separated(part, joined(label, name)));
     const timed = inTime(images, slots, most, label);
-    return timed ?? [{ images, reason: 'several images at the same position, which nothing tells apart' }];
+    return (
+      timed ?? [
+        { images, reason: 'several images at the same position, without any attribute that distinguishes them' },
+      ]
+    );
   }
   const slices = images.toSorted((a, b) => along(a) - along(b));
   return apart(slices, label) ?? [{ frames: [slices], label, notes: [] }];
@@ -194,7 +198,7 @@ function inTime(images: Frame[], slots: number[], most: number, label: string): 
   if (images.length !== most * places) return undefined;
   for (const mark of CLOCKS) {
     const frames = byClock(images, slots, mark, most);
-    const note = 'Frames were told apart by the numbers of the images only.';
+    const note = 'Frames were distinguished by the numbers of the images only.';
     if (frames) return [{ frames, label, notes: mark === 'instance' ? [note] : [] }];
   }
   return undefined;

@@ -39,11 +39,11 @@ export { type DicomProgress, type DicomReadOptions, DicomVolume } from './volume
 export interface DicomOptions {
   /** Aborts the opening, which then rejects with `signal.reason`. */
   signal?: AbortSignal;
-  /** Called as files are looked at. */
+  /** Called after each file. */
   onProgress?: (progress: DicomProgress) => void;
 }
 
-/** What a folder of DICOM files holds. */
+/** Volumes of a folder of DICOM files, and the files that are part of none. */
 export interface DicomListing {
   /** The volumes, of which those with most voxels come first, and localisers last. */
   volumes: DicomVolume[];

@@ -1,4 +1,4 @@
-// What is known of DICOM images before their voxels are read.
+// DICOM images before their voxels are read: geometry, scale and identifiers.
 import type { Vec3 } from '../data.js';
 import type { Source } from './source.js';
 
@@ -44,7 +44,7 @@ export interface Frame {
   segment: number | undefined;
 }
 
-/** What all images of a series have in common. */
+/** Attributes that all images of a series have in common. */
 export interface Series {
   uid: string;
   /** Class of the objects. */

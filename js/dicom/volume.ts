@@ -23,7 +23,7 @@ export interface DicomProgress {
 /** Options of {@link DicomVolume.read}. */
 export interface DicomReadOptions {
   /**
-   * What to do with slices at uneven distances, some of which are missing, for example: `'refuse'` them, or `'resample'`
+   * Treatment of slices at uneven distances, some of which are missing, for example: `'refuse'` them, or `'resample'`
    * them evenly, by linear interpolation between neighbouring slices. Default `'refuse'`.
    */
   uneven?: 'refuse' | 'resample';
@@ -62,7 +62,7 @@ export abstract class DicomVolume {
   readonly images: number;
   /** Things to know before relying on the volume, which it will have as its warnings. */
   readonly warnings: readonly Warning[];
-  /** What the file says of intensities: their unit, the padding value, that small ones are bright. */
+  /** Facts about the intensities: their unit, the padding value, that small ones are bright. */
   readonly remarks: readonly string[];
   /** Why the slices are uneven, so that the volume must be resampled or refused; undefined if they are even. */
   readonly uneven: string | undefined;

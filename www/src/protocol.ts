@@ -42,10 +42,10 @@ export type {
 
 export type ParamValues = Record<string, unknown>;
 
-/** What is known of a file that its format cannot hold, since it was written from one of another program. */
+/** Facts about a file that its format cannot hold, since it was written from one of another program. */
 export interface FileNotes {
   warnings: readonly Warning[];
-  /** What else the other file says, in words. */
+  /** Further statements of the other file, in words. */
   remarks?: readonly string[];
   /** Space that positions are to be in; the file's own by default. */
   space?: 'LPS';
@@ -140,7 +140,7 @@ export interface VolumeView extends LevelView {
   histogram: Uint32Array;
   /** Warnings about the volume. */
   warnings: readonly Warning[];
-  /** What else its file says of it, in words. */
+  /** Further statements of its file, in words. */
   remarks?: readonly string[];
   /**
    * If the volume is the coarsest level of one larger than memory: the numbers of voxels of all its levels, finest first,

@@ -18,7 +18,7 @@ export type Admission = 'volume' | 'labelled' | 'frames' | 'any';
 /** Notes on files that were written here, or came with a session. */
 const notes = new WeakMap<File, FileNotes>();
 
-/** Returns what is known of a file that it does not say itself. */
+/** Returns the notes on a file, which it does not contain itself. */
 export const notesOf = (file: File): FileNotes | undefined => notes.get(file);
 
 /** Returns a file with notes. */

@@ -29,7 +29,7 @@ export interface Candidate {
   uneven: string | undefined;
 }
 
-/** What files hold. */
+/** The volumes that files hold. */
 export interface Listing {
   candidates: Candidate[];
   /** Files that are part of none, each with the reason. */

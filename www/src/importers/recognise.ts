@@ -1,6 +1,6 @@
 /** Tells formats of other programs by the first bytes of files. */
 
-/** Number of bytes of a file that are looked at. */
+/** Number of bytes of a file that are tested. */
 export const HEAD = 132;
 
 const hasBytes = (bytes: Uint8Array, at: number, expected: number[]) =>

@@ -1,8 +1,8 @@
-/** What is known of the space of a volume, which is that of its surfaces. */
+/** The space and unit of a volume, which are those of its surfaces. */
 import type { Unit } from '../examples';
 import type { ExportRequest, VolumeView } from '../protocol';
 
-/** What files of a surface state of its positions: the directions of the axes, and the length of a unit. */
+/** Statements about positions in files of a surface: the directions of the axes, and the length of a unit. */
 export type SurfaceSpace = Pick<ExportRequest, 'space' | 'unit'>;
 
 /** Returns the unit of lengths that a volume's file states; empty if it states none. */

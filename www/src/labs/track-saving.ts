@@ -6,7 +6,7 @@ import type { SurfaceSpace } from './surface-space';
 import { framesCsv } from './track-measures';
 import type { TrackResults } from './track-results';
 
-/** What a lab's page knows of its surfaces, and how it saves files. */
+/** A lab's page, as saving needs it. */
 interface Saver {
   saving: Saving;
   surfaceSpace: SurfaceSpace;

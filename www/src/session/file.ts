@@ -25,7 +25,7 @@ export interface SourceFile {
   /** SHA-256 of its bytes in hexadecimal digits. */
   sha256: string;
   content?: Uint8Array;
-  /** What is known of a file that was written from one of another program. */
+  /** Notes on a file that was written from one of another program. */
   notes?: FileNotes;
 }
 

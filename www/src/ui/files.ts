@@ -30,7 +30,7 @@ export function fileChooser(
   return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, label));
 }
 
-/** What is done with files that are dropped. */
+/** Options of accepting files that are dropped. */
 interface DropOptions {
   admission?: Admission;
   /** Takes a folder that is an OME-Zarr image. */
