@@ -37,6 +37,8 @@ export interface Layout {
   frameSeconds?: number | undefined;
   calibration?: { slope: number; intercept: number } | undefined;
   warnings: string[];
+  /** Facts that are no reason to doubt the voxels. */
+  remarks?: string[];
 }
 
 /** Numbers of slices, channels and frames. */

@@ -182,7 +182,8 @@ class Placing {
     return {
       channels: complete.flatMap((one) => this.#channel(one.c, one.frames < frames)),
       ...{ slices: this.#end.z, frames, spacing, unit, frameSeconds },
-      warnings: [...warnings, ...this.#fewer(frames), ...this.#left(), ...assumed, ...this.#components.warnings],
+      warnings: [...warnings, ...this.#fewer(frames), ...assumed, ...this.#components.warnings],
+      remarks: this.#left(),
     };
   }
 
@@ -237,7 +238,7 @@ class Placing {
     );
   }
 
-  /** Returns a warning about channels that have no pages. */
+  /** Returns a remark about channels that have no pages. */
   #left(): string[] {
     const { C } = this.#sizes;
     if (this.#channels.size === C) return [];

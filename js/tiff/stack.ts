@@ -13,7 +13,7 @@ import type { Source } from './source.js';
 
 /** Options of reading a stack. */
 export interface TiffOptions {
-  /** Index of the channel to read; default 0, with a warning if there are several. */
+  /** Index of the channel to read; default 0. */
   channel?: number;
   /** Aborts the reading, which then rejects with `signal.reason`. */
   signal?: AbortSignal;
@@ -62,6 +62,8 @@ export class TiffStack {
   readonly frameSeconds: number | undefined;
   /** Findings of the reader: assumptions that it made, and parts that it leaves out. */
   readonly warnings: readonly Warning[];
+  /** Facts that are no reason to doubt the voxels, such as channels in files that were not opened. */
+  readonly remarks: readonly string[];
   readonly #layout: Layout;
   readonly #sources: Source[];
 
@@ -74,6 +76,7 @@ export class TiffStack {
     this.unit = layout.unit;
     this.frameSeconds = layout.frames > 1 ? layout.frameSeconds : undefined;
     this.warnings = layout.warnings.map(warning);
+    this.remarks = layout.remarks ?? [];
     this.#layout = layout;
     this.#sources = sources;
   }
@@ -91,7 +94,6 @@ export class TiffStack {
     if (!chosen) throw invalid('channel', `must be an integer from 0 to ${this.channels.length - 1}, got ${channel}`);
     if (chosen.missing) throw badTiff(this.#sources[0]?.name ?? '', chosen.missing);
     const warnings = [...this.warnings];
-    if (channel === undefined && this.channels.length > 1) warnings.push(warning(this.#severalChannels()));
     const lost = new Set<string>();
     const data = await withPause(signal, async (pause) => {
       const formats = await this.#formats(chosen, pause);
@@ -100,11 +102,6 @@ export class TiffStack {
     if (lost.size > 0)
       warnings.push(warning(`${[...lost][0]}: parts of the image are not stored in the file: they are 0`));
     return this.#init(data, warnings);
-  }
-
-  #severalChannels(): string {
-    const [first, ...others] = this.channels.slice(0, 10).map(({ name }) => `"${name}"`);
-    return `the first of ${this.channels.length} channels is read, ${first}; the others are ${others.join(', ')}`;
   }
 
   #init(data: VoxelArray, warnings: Warning[]): VolumeInit {

@@ -141,8 +141,15 @@ describe('a surface far away', () => {
     vi.stubGlobal('FileReader', BlobReader);
     const surface = surfaceOf(far());
     const label = { value: 1, name: 'one', color: '#ff0000', visible: true };
-    const mesh = Mesh.parse(await toGlb([label], new Map([[1, surface]]), []));
-    expect(off(mesh.info().centroid, far().info().centroid)).toBeLessThan(1e-4);
+    for (const [given, space, unit] of [
+      [{}, undefined, undefined],
+      [{ space: 'LPS', unit: 'mm' }, 'LPS', 'mm'],
+      [{ space: 'RAS' }, 'RAS', undefined],
+    ] as const) {
+      const mesh = Mesh.parse(await toGlb([label], new Map([[1, surface]]), [], given));
+      expect(off(mesh.info().centroid, far().info().centroid)).toBeLessThan(1e-4);
+      expect([mesh.space, mesh.unit]).toEqual([space, unit]);
+    }
   });
 });
 

@@ -523,7 +523,8 @@ describe('files', () => {
     expect(glb.name).toMatch(/\.glb$/);
     const length = new DataView(glb.bytes.buffer, glb.bytes.byteOffset).getUint32(12, true);
     const { nodes } = JSON.parse(strFromU8(glb.bytes.subarray(20, 20 + length)));
-    expect(nodes.map(({ name }: { name: string }) => name)).toEqual(['Label 3', 'Left part']);
+    expect(nodes.flatMap(({ name }: { name?: string }) => name ?? [])).toEqual(['Label 3', 'Left part']);
+    expect(nodes[0].extras).toMatchObject({ space: 'RAS' });
     for (const format of ['ply', 'stl', 'obj']) {
       const files = unzipSync((await saved(`[data-export=${format}]`)).bytes);
       expect(Object.keys(files)).toEqual([`3-Label-3.${format}`, `7-Left-part.${format}`]);

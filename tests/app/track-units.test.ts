@@ -106,6 +106,10 @@ describe('a heartbeat', () => {
     const lines = framesCsv([frame] as unknown as Parameters<typeof framesCsv>[0], [2.5]).split('\n');
     expect(lines[0]).toMatch(/^frame,volume,area,triangles,folded,.*,error,error \(95 %\),true volume$/);
     expect(lines[1]).toBe('1,2,3,4,5,6,7,8,9,10,,0.5,1,2.5');
+    const [head] = framesCsv([frame] as unknown as Parameters<typeof framesCsv>[0], [2.5], [], 'mm').split('\n');
+    expect(head).toMatch(
+      /^frame,volume \(mm³\),area \(mm²\),triangles,.*,error \(mm\),error \(95 %\) \(mm\),true volume \(mm³\)$/,
+    );
   });
 });
 

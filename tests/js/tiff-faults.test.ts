@@ -96,7 +96,7 @@ describe('a file that is', () => {
     const far = ome('SizeZ="100000000" SizeT="1000000"', '<TiffData IFD="0" FirstZ="99999999" FirstT="999999"/>');
     expect(await refusal(stack(1, far))).toMatch(/slice 1 of frame 1 of channel 1 is missing/);
     const many = ome('SizeC="1000000000"', '<TiffData IFD="0" FirstC="999999999"/>');
-    expect((await openTiff(stack(1, many))).warnings[0]?.text).toMatch(/999999999 of 1000000000 channels/);
+    expect((await openTiff(stack(1, many))).remarks[0]).toMatch(/999999999 of 1000000000 channels/);
     const again = '<TiffData IFD="0" PlaneCount="100"/>'.repeat(20_000);
     expect(await refusal(stack(4, ome('SizeZ="100"', again)))).toMatch(/placed again and again/);
     const longest = [

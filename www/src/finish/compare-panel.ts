@@ -187,7 +187,8 @@ export class ReferencePanel {
   #save(): void {
     const found = this.#comparison;
     if (!found) return;
-    const head = ['direction', ...MEASURES.map(([name]) => (name === 'max' ? 'hausdorff' : name))];
+    const unit = this.unit && ` (${this.unit})`;
+    const head = ['direction', ...MEASURES.map(([name]) => (name === 'max' ? 'hausdorff' : name) + unit)];
     const lines = DIRECTIONS.map(([name]) => [name, ...MEASURES.map(([measure]) => found[name][measure])]);
     const warnings = cellOf(this.#events.warnings());
     const rest = [['dice', found.dice ?? ''], ...(warnings ? [['warnings', warnings]] : [])];

@@ -55,7 +55,7 @@ async function list({ files }: { files: File[] }): Promise<Listing> {
 
 async function listTiff(files: File[]): Promise<Found> {
   const stack = await openTiff(files);
-  const { dims, spacing, frames, unit = '', warnings, channels } = stack;
+  const { dims, spacing, frames, unit = '', warnings, remarks, channels } = stack;
   if (dims[2] === 1) throw new Refusal('bad-file', text('files.singleSlice', { format: 'TIFF' }));
   const stem = files[0]?.name.replace(/(\.ome)?\.tiff?$/i, '') ?? '';
   const known = { kind: 'image', patient: '', modality: '', date: '', uneven: undefined, remarks: [] } as const;
@@ -76,8 +76,8 @@ async function listTiff(files: File[]): Promise<Found> {
     const onProgress = (share: number) =>
       tell('images')({ done: Math.round(share * shown.images), total: shown.images });
     return {
-      candidate: { ...shown, remarks: [], warnings: warnings.map(({ text }) => text) },
-      read: async () => written(own, await stack.read({ channel, onProgress }), {}),
+      candidate: { ...shown, remarks: [...remarks], warnings: warnings.map(({ text }) => text) },
+      read: async () => written(own, await stack.read({ channel, onProgress }), { remarks: [...remarks] }),
     };
   });
   return { candidates, skipped: [] };

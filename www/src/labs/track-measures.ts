@@ -1,3 +1,4 @@
+import type { Unit } from '../examples';
 import { text } from '../texts';
 import { beatOf } from '../track/curve';
 import type { TrackedFrame } from '../track/protocol';
@@ -89,19 +90,33 @@ const COLUMNS = [
   ],
 ] as const;
 
+/** Powers of the unit of length in columns. */
+const POWERS: Partial<Record<string, string>> = {
+  ...{ volume: '³', area: '²', meanFinalCorrection: '' },
+  ...{ error: '', 'error (95 %)': '', 'true volume': '³' },
+};
+
+/** Returns the heading of a column, with its unit if it has one, and lengths have a known one. */
+function headOf(column: string, unit: Unit): string {
+  const power = POWERS[column];
+  return unit !== '' && power !== undefined ? `${column} (${unit}${power})` : column;
+}
+
 /**
- * Returns the data of all tracked frames as CSV, one line per frame; lengths, areas and volumes in world units. `truth`
- * are the true volumes of the frames, if known. If there are warnings, a last column has the codes of those that concern
+ * Returns the data of all tracked frames as CSV, one line per frame; lengths, areas and volumes in world units, which the
+ * heads name if they are known. `truth` are the true volumes of the frames, if known. If there are warnings, a last column has the codes of those that concern
  * the frame.
  */
 export function framesCsv(
   frames: readonly TrackedFrame[],
   truth: readonly number[] | undefined,
   warnings: readonly Warning[] = [],
+  unit: Unit = '',
 ): string {
   const known = frames.some(({ error }) => error);
   const ofError = known ? ['error', 'error (95 %)', 'true volume'] : [];
-  const head = ['frame', ...COLUMNS, 'self-intersections', ...ofError, ...(warnings.length > 0 ? ['warnings'] : [])];
+  const names = ['frame', ...COLUMNS, 'self-intersections', ...ofError, ...(warnings.length > 0 ? ['warnings'] : [])];
+  const head = names.map((name) => headOf(name, unit));
   const lines = frames.map(({ facts, measures, error }, i) => [
     i + 1,
     ...COLUMNS.map((name) => facts[name as keyof typeof facts]),

@@ -1,4 +1,5 @@
 import { zipSync } from 'three/addons/libs/fflate.module.js';
+import type { Unit } from '../examples';
 import type { TrackClient } from '../track/client';
 import { concerning, type Warning } from '../warnings';
 import type { Saving } from './saving';
@@ -10,6 +11,7 @@ import type { TrackResults } from './track-results';
 interface Saver {
   saving: Saving;
   surfaceSpace: SurfaceSpace;
+  unit: Unit;
   warnings: { all: readonly Warning[] };
 }
 
@@ -20,10 +22,10 @@ interface Saver {
 export async function saveTrack(
   what: 'frames' | 'animation' | 'table',
   client: TrackClient,
-  { saving, surfaceSpace, warnings: { all } }: Saver,
+  { saving, surfaceSpace, unit, warnings: { all } }: Saver,
   { frames, truth }: TrackResults,
 ): Promise<void> {
-  if (what === 'table') saving.bytes('csv', new TextEncoder().encode(framesCsv(frames, truth, all)), 'text/csv');
+  if (what === 'table') saving.bytes('csv', new TextEncoder().encode(framesCsv(frames, truth, all, unit)), 'text/csv');
   else if (what === 'animation')
     saving.bytes('glb', await client.request('animation', surfaceSpace), 'model/gltf-binary');
   else saving.bytes('zip', await archive(frames.length, client, surfaceSpace, all), 'application/zip');
