@@ -38,6 +38,9 @@ export async function admitted(files: File[], admission: Admission): Promise<Fil
   return admission === 'volume' ? oneOf(files) : files;
 }
 
+/** Whether files are of a format that only other programs read. */
+export const anyForeign = async (files: File[]) => files.length > 0 && (await foreignAmong(files)).length > 0;
+
 /** Returns the files that are DICOM or, if none is, all if all are TIFF. */
 async function foreignAmong(files: File[]): Promise<File[]> {
   const heads = await Promise.all(files.map(async (file) => new Uint8Array(await file.slice(0, HEAD).arrayBuffer())));

@@ -1,5 +1,5 @@
 import type { Finish } from '../finish';
-import { noted } from '../importers';
+import { anyForeign, noted } from '../importers';
 import type { Session, SourceFile } from '../session/file';
 import { isSession } from '../session/recognise';
 import { text } from '../texts';
@@ -116,6 +116,7 @@ export class Sessions {
   /** Continues a session with its data, and edits its surface as before. */
   async #restore(session: Session, files: File[]): Promise<void> {
     const { opening, ui, states } = this.#lab;
+    if (await anyForeign(files)) throw new Error(text('sessions.foreign'));
     await opening.session(session, files);
     const { edits, undone = [], warnings } = session.content;
     if (opening.source?.session !== session) return;
