@@ -191,7 +191,12 @@ function inTime(images: Frame[], slots: number[], most: number, label: string): 
     const groups = byMark(images, mark);
     if (groups.length !== most || !groups.every(([, group]) => largestSlot(slotsOf(group)) === 1)) continue;
     const frames = groups.map(([, group]) => group.toSorted((a, b) => along(a) - along(b)));
-    if (frames.every(({ length }) => length === places)) return [{ frames, label, notes: [] }];
+    const complete = frames.filter(({ length }) => length === places);
+    if (complete.length === frames.length) return [{ frames, label, notes: [] }];
+    const left = frames.length - complete.length;
+    const note = `${left} of ${frames.length} frames ${left === 1 ? 'lacks' : 'lack'} slices, and ${left === 1 ? 'was' : 'were'} left out.`;
+    // Recordings may have been stopped early.
+    if (complete.length > 1) return [{ frames: complete, label, notes: [note] }];
     // Frames that lack slices are no frames of one volume.
     return groups.map(([name], k) => ({ frames: [frames[k] ?? []], label: joined(label, name), notes: [] }));
   }

@@ -126,7 +126,7 @@ function geometryOf(
   at: FrameAttributes,
   index: number,
   count: number,
-): Pick<Frame, 'position' | 'along' | 'down' | 'spacing'> {
+): Pick<Frame, 'position' | 'along' | 'down' | 'spacing' | 'isChained'> {
   // Nuclear medicine has the place of the first frame in the description of the detector (PS3.3, C.8.4.11).
   const detector = at.data.elements.x00540022?.items?.[0]?.dataSet;
   const six = firstOf(at.numbers(ORIENTATION), numbersOf(detector, 'x00200037'));
@@ -137,16 +137,18 @@ function geometryOf(
     throw new Unusable('an image without pixel spacing');
   const [along, down] = directions(six);
   const normal = cross(along, down);
-  const offset = count > 1 && !isPlaced(at.data, index) ? offsetOf(at, index) : 0;
+  const isPlaced = count === 1 || hasPosition(at.data, index);
+  const offset = isPlaced ? 0 : offsetOf(at, index);
   const position = [0, 1, 2].map((k) => (start[k] ?? 0) + offset * (normal[k] ?? 0)) as Vec3;
   if (!position.every(Number.isFinite)) throw new Unusable('an image without position and orientation');
-  return { position, along, down, spacing: [between[1] ?? 1, between[0] ?? 1] };
+  const isChained = !isPlaced && at.data.elements.x3004000c === undefined;
+  return { position, along, down, spacing: [between[1] ?? 1, between[0] ?? 1], isChained };
 }
 
 const firstOf = (...lists: number[][]) => lists.find(({ length }) => length > 0) ?? [];
 
 /** Whether the file places each of its frames. */
-const isPlaced = (data: DataSet, index: number) =>
+const hasPosition = (data: DataSet, index: number) =>
   data.elements.x52009230?.items?.[index]?.dataSet?.elements.x00209113 !== undefined;
 
 /**
@@ -215,6 +217,7 @@ function seriesOf(data: DataSet, transferSyntax: string): Series {
     inverted: textOf(data, 'x00280004') === 'MONOCHROME1',
     units: textOf(data, 'x00541001'),
     lossy: textOf(data, 'x00282110') === '01' || LOSSY.test(transferSyntax),
+    hasTable: (data.elements.x00283000?.items?.length ?? 0) > 0 && numberOf(data, 'x00281053') === undefined,
     padding,
     segments: segmentsOf(data),
     wholeFraction: wholeFractionOf(data),

@@ -40,6 +40,8 @@ export interface Frame {
   intercept: number;
   /** Values that tell images at the same position apart, by the name of the attribute. */
   marks: Record<string, string | number>;
+  /** Whether only the first image of the file has a position, and the others follow at a distance that the file states. */
+  isChained: boolean;
   /** Number of the segment that the frame belongs to, in segmentations. */
   segment: number | undefined;
 }
@@ -63,6 +65,8 @@ export interface Series {
   /** Unit of intensities that the file states, such as `BQML`. */
   units: string;
   lossy: boolean;
+  /** Whether intensities are given by a table, which is not applied, instead of slope and intercept. */
+  hasTable: boolean;
   /** Stored value outside of what was measured. */
   padding: number | undefined;
   segments: readonly Segment[];

@@ -169,7 +169,7 @@ export class ImageVolume extends DicomVolume {
     const affine = affineOf(slices, count);
     const { seconds, note } = secondsOf(frames);
     const off = evenness.kind === 'even' && evenness.note ? [evenness.note] : [];
-    const texts = [...notes, ...off, ...(note ? [note] : []), ...(first.series.lossy ? [LOSSY] : [])];
+    const texts = [...notes, ...off, ...(note ? [note] : []), ...doubtsOn(first)];
     super(first.series, label, {
       dims: [first.format.columns, first.format.rows, count],
       spacing: spacingOf(affine),
@@ -230,7 +230,20 @@ function interpolated(uneven: string | undefined): Warning[] {
   return [reader(`${reason}. Slices at equal distances were interpolated between their neighbours.`)];
 }
 
-const LOSSY = 'The images were compressed with loss: intensities differ from those that were measured.';
+/** Returns reasons to doubt intensities or positions that concern all images. */
+function doubtsOn({ series, isChained }: Frame): string[] {
+  return [
+    ...(series.lossy
+      ? ['The images were compressed with loss: intensities differ from those that were measured.']
+      : []),
+    ...(series.hasTable
+      ? ['Intensities are given by a table in the file, which is not applied: values are as stored.']
+      : []),
+    ...(isChained
+      ? ['Only the first slice has a position: the others follow at the distance that the file states.']
+      : []),
+  ];
+}
 
 function rescaled(
   stored: VoxelArray,

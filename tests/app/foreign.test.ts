@@ -176,7 +176,7 @@ describe('TIFF', () => {
       OME,
     );
     await app.page.setInputFiles('input[type=file]', [{ name: 'cell.ome.tif', mimeType: 'image/tiff', buffer: file }]);
-    const dialog = app.page.getByRole('dialog');
+    const dialog = app.page.locator('dialog[open]:has(form.choice-form)');
     await dialog.waitFor();
     expect(await dialog.textContent()).toMatch(/cell, channel .*cell, channel /);
     await dialog.getByRole('button', { name: 'Open' }).click();

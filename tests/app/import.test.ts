@@ -38,7 +38,8 @@ afterEach(() => {
 });
 
 const give = (files: Given[]) => app.page.setInputFiles('input[type=file]', files);
-const dialog = () => app.page.locator('dialog.volume-choice[open]');
+/** The dialog once it asks something: while files are read, it shows their progress. */
+const dialog = () => app.page.locator('dialog.volume-choice[open]:has(form)');
 const facts = () => app.page.textContent('.facts');
 const warnings = () => app.page.textContent('[data-warning-list]');
 

@@ -119,6 +119,11 @@ describe('a series', () => {
     expect(slicesOf(init)[0]).toEqual(Array.from({ length: SIZE }, (_, i) => i - 10));
   });
 
+  test('that a table maps to intensities are as stored, with a warning', async () => {
+    const volume = await only(series(() => ({ '00283000': ['SQ', [{ '00283003': ['LO', 'table'] }]] })));
+    expect(texts(volume).join()).toMatch(/table in the file, which is not applied/);
+  });
+
   test('MONOCHROME1 keeps stored values and says so; units, padding and loss are said', async () => {
     const volume = await only(series(() => ({ '00280004': ['CS', 'MONOCHROME1'] })));
     expect(volume.inverted).toBe(true);
@@ -324,6 +329,15 @@ describe('images at the same position', () => {
     await expect(readDicom(files)).rejects.toMatchObject(refused(/same position, without any attribute/));
   });
 
+  test('of which the last time was stopped early: frames of those that are complete, with a warning', async () => {
+    const third = series((z) => ({ '00200100': ['IS', '3'], '00080018': ['UI', `1.2.3.4.9.${z}`] }), {
+      slices: [0, 1],
+    });
+    const volume = await only([...twice((time) => ({ '00200100': ['IS', String(time + 1)] })), ...third]);
+    expect(volume).toMatchObject({ frames: 2, dims: [5, 4, 6] });
+    expect(texts(volume)).toEqual(['1 of 3 frames lacks slices, and was left out.']);
+  });
+
   test('of which one time lacks a slice: two volumes, of which one is uneven', async () => {
     const files = twice((time) => ({ '00200100': ['IS', String(time + 1)] }));
     const { volumes } = await openDicom(files.filter((_, k) => k !== 3));
@@ -379,6 +393,19 @@ describe('multi-frame files', () => {
     const init = await readDicom([{ name: 'dose', bytes: new Uint8Array(bytes) }]);
     expect(init).toMatchObject({ dims: [5, 4, 3], slope: 0.001 });
     expect(init.affine?.[10]).toBe(2.5);
+  });
+
+  test('frames of which only the first has a position follow at the stated distance, with a warning', async () => {
+    const bytes = dicomFile({
+      ...sliceElements(GRID, 0, voxels(0)),
+      '00180088': ['DS', '2.5'],
+      '00280008': ['IS', '3'],
+      '7fe00010': ['OW', Buffer.concat([0, 1, 2].map((z) => Buffer.from(voxels(z).buffer)))],
+    });
+    const init = await readDicom([{ name: 'nm', bytes: new Uint8Array(bytes) }]);
+    expect(slicesOf(init)).toEqual([0, 1, 2].map(expected));
+    expect(init.affine?.[10]).toBe(2.5);
+    expect(init.warnings?.[0]?.text).toMatch(/^Only the first slice has a position/);
   });
 
   test('frames without positions are no volume', async () => {
