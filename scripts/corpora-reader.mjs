@@ -1,29 +1,14 @@
 // Reads one file for each line of its input, `{ path, kind }`, and answers with what it found, for `corpora.mjs`.
 import { openAsBlob } from 'node:fs';
-import { readdir, readFile, stat } from 'node:fs/promises';
-import { basename, dirname, join } from 'node:path';
+import { readFile } from 'node:fs/promises';
+import { basename } from 'node:path';
 import { createInterface } from 'node:readline';
 import { readDicom } from '../pkg/dicom/index.js';
 import init, { Mesh, parsePoints, VesicleError, Volume } from '../pkg/index.js';
 import { readTiff } from '../pkg/tiff/index.js';
-
-/** Most bytes of all files beside one that may refer to them. */
-const MOST_BESIDE = 2 ** 28;
+import { filesBeside } from './beside.mjs';
 
 const bytesOf = async (path) => new Uint8Array(await readFile(path));
-
-/** Returns the files beside one, for headers and documents that refer to others. */
-async function beside(path) {
-  const files = [];
-  let size = 0;
-  for (const entry of await readdir(dirname(path), { withFileTypes: true })) {
-    if (!entry.isFile() || entry.name === basename(path)) continue;
-    size += (await stat(join(dirname(path), entry.name))).size;
-    if (size > MOST_BESIDE) break;
-    files.push({ name: entry.name, bytes: await bytesOf(join(dirname(path), entry.name)) });
-  }
-  return files;
-}
 
 function volumeFacts(volume) {
   const { dims, frames, spacing, range } = volume;
@@ -39,7 +24,7 @@ async function readVolume(path) {
   const isPair = /\.hdr$/i.test(path);
   const isHeader = isPair || /\.(nhdr|mhd)$/i.test(path) || /\.mha$/i.test(path);
   const files = isHeader
-    ? (await beside(path)).filter(({ name }) => !isPair || /^\.img(\.gz)?$/i.test(name.slice(stem.length)))
+    ? (await filesBeside(path)).filter(({ name }) => !isPair || /^\.img(\.gz)?$/i.test(name.slice(stem.length)))
     : undefined;
   return inVolume(Volume.parse(bytes, files && { files }));
 }
@@ -51,7 +36,7 @@ function inVolume(volume) {
 }
 
 async function readMesh(path) {
-  const files = /\.gltf$/i.test(path) ? await beside(path) : [];
+  const files = /\.gltf$/i.test(path) ? await filesBeside(path) : [];
   const mesh = Mesh.parse(await bytesOf(path), { files });
   const { area, volume } = mesh.info();
   const found = {
@@ -69,7 +54,7 @@ async function readPoints(path) {
 
 const file = async (path) => ({ name: basename(path), bytes: await openAsBlob(path) });
 
-/** Reads the images of a DICOM file; one alone is no volume, and counts as refused. */
+/** Readers by class; a DICOM file with one image is no volume, and counts as refused. */
 const READERS = {
   volume: readVolume,
   mesh: readMesh,

@@ -3,8 +3,9 @@
 // the figures of flying edges and isotropic remeshing below it. Ends with 1 if a surface intersects itself, or if
 // recall or precision is below 99 %.
 import { readdir, readFile } from 'node:fs/promises';
-import { basename, dirname, join, relative } from 'node:path';
+import { basename, join, relative } from 'node:path';
 import { parseArgs } from 'node:util';
+import { filesBeside } from './beside.mjs';
 import { build } from './build.mjs';
 import { pipelineLine, pipelineOf } from './pipeline.mjs';
 import { at, say, script, startedAs } from './shell.mjs';
@@ -26,13 +27,6 @@ async function volumesIn(folder) {
   const entries = await readdir(folder, { recursive: true, withFileTypes: true });
   const files = entries.filter((entry) => entry.isFile() && VOLUMES.test(entry.name));
   return files.map((entry) => join(entry.parentPath, entry.name)).sort();
-}
-
-/** Returns the data file that a header names, if it names one beside it. */
-async function dataBeside(path, bytes) {
-  if (!/\.(nhdr|mhd)$/.test(path)) return undefined;
-  const [, name] = /^(?:data ?file|ElementDataFile)\s*[:=]\s*(\S+)\s*$/im.exec(bytes.toString('latin1')) ?? [];
-  return name ? new Uint8Array(await readFile(join(dirname(path), name))) : undefined;
 }
 
 function smoothed(histogram) {
@@ -151,7 +145,8 @@ async function report(library, path, name, { levels, pipeline }) {
   const bytes = await readFile(path);
   let volume;
   try {
-    volume = library.Volume.parse(new Uint8Array(bytes), { data: await dataBeside(path, bytes) });
+    const files = /\.(nhdr|mhd)$/.test(path) ? await filesBeside(path) : undefined;
+    volume = library.Volume.parse(new Uint8Array(bytes), files && { files });
   } catch (error) {
     process.stdout.write(`${name.padEnd(LONGEST_NAME)} not read: ${error.message.slice(0, 80)}\n`);
     return [];

@@ -1,0 +1,20 @@
+// Files beside one that may refer to them: the voxels of a header, the buffers of a document.
+import { readdir, readFile, stat } from 'node:fs/promises';
+import { basename, dirname, join } from 'node:path';
+
+/** Most bytes of all files beside one. */
+const MOST_BYTES = 2 ** 28;
+
+/** Returns the files in the folder of a file, without it, as `{ name, bytes }`, as far as they are not too many. */
+export async function filesBeside(path) {
+  const files = [];
+  let size = 0;
+  for (const entry of await readdir(dirname(path), { withFileTypes: true })) {
+    if (!entry.isFile() || entry.name === basename(path)) continue;
+    const other = join(dirname(path), entry.name);
+    size += (await stat(other)).size;
+    if (size > MOST_BYTES) break;
+    files.push({ name: entry.name, bytes: new Uint8Array(await readFile(other)) });
+  }
+  return files;
+}
