@@ -29,6 +29,8 @@ export interface Decoded {
   bytes: Uint8Array;
   /** Bytes of one voxel. */
   size: number;
+  /** Whether the compression lost something; undefined if the decoder does not tell. */
+  lossy?: boolean;
 }
 
 export type Decode = (bytes: Uint8Array) => Decoded;
@@ -38,6 +40,8 @@ interface Instance {
   getEncodedBuffer(length: number): Uint8Array;
   decode(): void;
   getDecodedBuffer(): Uint8Array;
+  getNearLossless?(): number;
+  getIsReversible?(): boolean;
   getFrameInfo(): { width: number; height: number; bitsPerSample: number; componentCount: number };
   delete(): void;
 }
@@ -164,7 +168,8 @@ function decodeWith(kind: string, module: Record<string, new () => Instance>): D
       const { bitsPerSample, componentCount } = decoder.getFrameInfo();
       if (componentCount !== 1) throw new Error(`${componentCount} components instead of one`);
       // A copy, since the memory of the module is used again.
-      return { bytes: decoder.getDecodedBuffer().slice(), size: bitsPerSample > 8 ? 2 : 1 };
+      const lossy = (decoder.getNearLossless?.() ?? 0) > 0 || decoder.getIsReversible?.() === false;
+      return { bytes: decoder.getDecodedBuffer().slice(), size: bitsPerSample > 8 ? 2 : 1, lossy };
     } finally {
       decoder.delete();
     }

@@ -11,6 +11,8 @@ export function reasonOf(error: unknown): string {
   const { exception } = Object(error) as { exception?: unknown };
   if (exception !== undefined) return reasonOf(exception);
   const text = error instanceof Error ? error.message : String(error);
+  // Modules of C++ throw addresses.
+  if (/^\d+$/.test(text)) return 'the decoder failed';
   // Messages of dicom-parser begin with the name of the function.
   return text.replace(/^dicomParser\.\w+: /, '').slice(0, 200);
 }

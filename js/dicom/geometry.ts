@@ -108,12 +108,15 @@ function missingAt(numbers: number[], count: number): string {
   return `${missing} of ${count} slices ${missing === 1 ? 'is' : 'are'} missing: between ${listed}`;
 }
 
-/** Returns the transform from voxel indices to LPS of `count` slices with the ends of these, column-major. */
-export function affineOf(slices: readonly Frame[], count: number): number[] {
+/**
+ * Returns the transform from voxel indices to LPS of `count` slices with the ends of these, column-major; `single` is the
+ * thickness of one alone.
+ */
+export function affineOf(slices: readonly Frame[], count: number, single = 1): number[] {
   const [first, last] = [slices[0] as Frame, slices.at(-1) as Frame];
   const { along, down, spacing, position } = first;
   const normal = cross(along, down);
-  const step = count > 1 ? minus(last.position, position).map((x) => x / (count - 1)) : normal;
+  const step = count > 1 ? minus(last.position, position).map((x) => x / (count - 1)) : normal.map((x) => x * single);
   return [...along.map((x) => x * spacing[0]), 0, ...down.map((x) => x * spacing[1]), 0, ...step, 0, ...position, 1];
 }
 

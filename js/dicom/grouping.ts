@@ -5,34 +5,34 @@
  *    are parallel (C.7.6.2). A localiser, which is often part of the series it was used to plan, is thereby a volume of
  *    its own, or a single image.
  * 2. A file that is there twice, with the same unique identifier (C.12.1), counts once.
- * 3. Of several images at the same position, those that differ in what was measured (echo, b-value, magnitude and phase,
- *    reconstruction) are different volumes; those that differ in time are frames of one volume.
+ * 3. Images that differ in what was measured (echo, b-value, kernel, thickness, stack) are of different volumes, as are those
+ *    of several files at the same position that are volumes of their own. Other images at the same position that differ in
+ *    their type (magnitude and phase) are of different volumes, too; those that differ in time are frames of one volume.
  * 4. Images at the same position without any such difference are not read, since the right one is unknown.
  */
 import type { Vec3 } from '../data.js';
 import { cross, dot, evennessOf } from './geometry.js';
 import type { Frame } from './types.js';
 
-/** Largest angle between images that count as parallel, radians: 0.1 mm at the far side of a body. */
-const PARALLEL = 3e-4;
+/** Largest difference of directions of images that count as parallel: those in files are rounded, to three digits and more. */
+const PARALLEL = 2e-3;
+/** Least cosine between the normals of images that are no localisers for each other. */
+const NEARLY_PARALLEL = 0.995;
 /** Largest relative difference of pixel spacings that count as equal. */
 const SAME_SPACING = 1e-4;
 /** Part of a pixel by which images at the same position may differ: as much as rounding changes positions. */
 const SAME_POSITION = 0.01;
 
-/** Attributes by which images at the same position are of different volumes, in the order in which they are tried. */
-const KINDS = [
-  'stack',
-  'image type',
-  'frame type',
-  'complex part',
-  'echo time',
-  'echo',
-  'b-value',
-  'inversion time',
-  'kVp',
-  'kernel',
+/** Part of a pixel beyond which images at the same distance along the normal are beside each other. */
+const BESIDE = 0.1;
+
+/** Attributes of what was measured: images with different values are of different volumes. */
+const MEASURED = [
+  ...['stack', 'complex part', 'echo time', 'echo', 'b-value', 'inversion time', 'flip angle'],
+  ...['kVp', 'kernel', 'thickness'],
 ];
+/** Attributes by which images are of different volumes if they are at the same position. */
+const KINDS = [...MEASURED, 'image type', 'frame type', 'file'];
 /** Attributes with one value for each frame of a volume with time. */
 const PHASES = ['temporal position', 'trigger time', 'frame reference time', 'acquisition'];
 /** Attributes that are larger for later images at the same position, but may differ from slice to slice. */
@@ -93,6 +93,7 @@ function areAlike(one: Frame, other: Frame): boolean {
   const [a, b] = [one.format, other.format];
   return (
     one.series.uid === other.series.uid &&
+    one.series.origin === other.series.origin &&
     one.series.sopClass === other.series.sopClass &&
     one.series.frameOfReference === other.series.frameOfReference &&
     one.series.inverted === other.series.inverted &&
@@ -109,6 +110,10 @@ function areAlike(one: Frame, other: Frame): boolean {
 /** Whether two images have the same directions. */
 export const isParallel = (one: Frame, other: Frame) => isNear(one.along, other.along) && isNear(one.down, other.down);
 
+/** Whether two images may be of one volume, but for a mistake in their directions. */
+export const isNearlyParallel = (one: Frame, other: Frame) =>
+  Math.abs(dot(normalOf(one), normalOf(other))) >= NEARLY_PARALLEL;
+
 const isNear = (a: Vec3, b: Vec3) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) <= PARALLEL;
 
 /** Rule 2. Files that lost their identifiers all have the same; those at other positions are no copies. */
@@ -124,6 +129,8 @@ function withoutCopies(group: Frame[]): { kept: Frame[]; copies: number } {
 
 /** Rules 3 and 4. */
 function separated(images: Frame[], label: string): (Stack | Conflict)[] {
+  const measured = byMeasure(images) ?? beside(images);
+  if (measured) return measured.flatMap(([name, part]) => separated(part, joined(label, name)));
   const slots = slotsOf(images);
   const most = largestSlot(slots);
   if (most > 1) {
@@ -167,14 +174,57 @@ function largestSlot(slots: readonly number[]): number {
   return Math.max(0, ...counts.values());
 }
 
-/** Returns the images by the values of an attribute, in the order of these. */
-function byMark(images: readonly Frame[], mark: string): [string, Frame[]][] {
-  const groups = grouped(images, ({ marks }) => marks[mark] ?? '');
-  const sorted = [...groups].toSorted(([a], [b]) => (a < b ? -1 : 1));
-  return sorted.map(([value, group]) => [`${mark} ${value === '' ? 'not stated' : value}`, group]);
+/** Returns the value of an attribute, rounded, if it is a number; of a file with one image alone, none that is its own. */
+function attributeOf({ marks, file, count }: Frame, mark: string): string | number {
+  if (mark === 'file') return count > 1 ? file.name : '';
+  const value = marks[mark] ?? '';
+  return typeof value === 'number' && MEASURED.includes(mark) ? Number(value.toPrecision(3)) : value;
 }
 
-/** Returns the images by the first attribute of what was measured that leaves fewer at the same position. */
+/** Returns the images by the values of an attribute, in the order of these. */
+function byMark(images: readonly Frame[], mark: string): [string, Frame[]][] {
+  const groups = grouped(images, (image) => attributeOf(image, mark));
+  const sorted = [...groups].toSorted(([a], [b]) => (a < b ? -1 : 1));
+  const name = (value: string | number) => (value === '' ? 'not stated' : value);
+  return sorted.map(([value, group]) => [`${mark} ${name(value)}`, group]);
+}
+
+/** Returns the images by the first attribute of what was measured of which there are several values, for two images and more. */
+function byMeasure(images: readonly Frame[]): [string, Frame[]][] | undefined {
+  for (const mark of MEASURED) {
+    const groups = byMark(images, mark);
+    if (groups.length > 1 && groups.every(([, group]) => group.length > 1)) return groups;
+  }
+  return undefined;
+}
+
+/** Returns the images by their position within their plane, if some are beside each other: at one distance along the normal. */
+function beside(images: readonly Frame[]): [string, Frame[]][] | undefined {
+  const slots = slotsOf(images);
+  const size = BESIDE * Math.min(...(images[0]?.spacing ?? [1]));
+  const firsts = new Map<number, Frame>();
+  const isBeside = images.some((image, k) => {
+    const first = firsts.get(slots[k] ?? 0);
+    firsts.set(slots[k] ?? 0, first ?? image);
+    return first !== undefined && inPlane(first, image) > size;
+  });
+  if (!isBeside) return undefined;
+  const groups: Frame[][] = [];
+  for (const image of images) {
+    const group = groups.find(([first]) => first && inPlane(first, image) <= size);
+    if (group) group.push(image);
+    else groups.push([image]);
+  }
+  return groups.map((group, k) => [`place ${k + 1}`, group]);
+}
+
+/** Returns the distance of two images within their plane. */
+function inPlane(one: Frame, other: Frame): number {
+  const off = one.position.map((x, k) => x - (other.position[k] ?? 0)) as Vec3;
+  return Math.hypot(dot(off, one.along), dot(off, one.down));
+}
+
+/** Returns the images by the first attribute that leaves fewer at the same position. */
 function byKind(images: readonly Frame[], most: number): [string, Frame[]][] | undefined {
   for (const mark of KINDS) {
     const groups = byMark(images, mark);

@@ -27,7 +27,7 @@ const SLOPE: Attribute = ['x00281053', 'x00289145'];
 const INTERCEPT: Attribute = ['x00281052', 'x00289145'];
 
 /** Attributes that tell images at the same position apart, as numbers or as text; see `grouping.ts`. */
-const MARKS: readonly (readonly [name: string, kind: 'number' | 'text', ...Attribute])[] = [
+const MARKS: readonly (readonly [name: string, kind: 'number' | 'text' | 'time', ...Attribute])[] = [
   ['stack', 'text', 'x00209056', 'x00209111'],
   ['image type', 'text', 'x00080008'],
   ['frame type', 'text', 'x00089007', 'x00189226'],
@@ -36,6 +36,10 @@ const MARKS: readonly (readonly [name: string, kind: 'number' | 'text', ...Attri
   ['echo time', 'number', 'x00189082', 'x00189114'],
   ['echo', 'number', 'x00180086'],
   ['b-value', 'number', 'x00189087', 'x00189117'],
+  // Of Siemens, in files without the standard attribute.
+  ['b-value', 'number', 'x0019100c'],
+  ['flip angle', 'number', 'x00181314'],
+  ['thickness', 'number', 'x00180050', 'x00289110'],
   ['inversion time', 'number', 'x00180082'],
   ['kVp', 'number', 'x00180060'],
   ['kernel', 'text', 'x00181210'],
@@ -46,9 +50,9 @@ const MARKS: readonly (readonly [name: string, kind: 'number' | 'text', ...Attri
   ['frame reference time', 'number', 'x00541300'],
   ['acquisition', 'number', 'x00200012'],
   ['acquisition time', 'text', 'x0008002a'],
-  ['acquisition time', 'text', 'x00080032'],
+  ['acquisition time', 'time', 'x00080032'],
   ['acquisition time', 'text', 'x00189074', 'x00209111'],
-  ['content time', 'text', 'x00080033'],
+  ['content time', 'time', 'x00080033'],
   ['instance', 'number', 'x00200013'],
   ['temporal resolution', 'number', 'x00200110'],
 ];
@@ -58,7 +62,8 @@ export function framesIn(file: Source, header: Header): Frame[] | Skipped {
   try {
     return frames(file, header);
   } catch (problem) {
-    if (problem instanceof Unusable) return { name: file.name, reason: problem.message };
+    if (problem instanceof Unusable)
+      return { name: file.name, reason: problem.message, series: textOf(header.data, 'x0020000e') };
     throw problem;
   }
 }
@@ -69,7 +74,9 @@ function frames(file: Source, header: Header): Frame[] {
   if (data.elements.x00041220) throw new Unusable('an index of files (DICOMDIR)');
   const pixels = [PIXEL_DATA, ...FLOAT_PIXELS].map((tag) => data.elements[tag]).find(Boolean);
   if (!pixels) throw new Unusable('no image');
-  const format = formatOf(header);
+  if (/\bMOSAIC\b/.test(textOf(data, 'x00080008')))
+    throw new Unusable('a mosaic of slices in one image, which is not taken apart');
+  const format = formatOf(header, pixels.vr);
   const series = seriesOf(data, header.transferSyntax);
   const count = Math.max(1, Math.floor(numberOf(data, 'x00280008') ?? 1));
   if (count > MOST_FRAMES) throw new Unusable(`${count} images in one file; at most ${MOST_FRAMES} are read`);
@@ -82,6 +89,7 @@ function frames(file: Source, header: Header): Frame[] {
       ...geometryOf(at, index, count),
       index,
       instance: numberOf(data, 'x00200013'),
+      statedStep: at.numbers(SLICE_SPACING)[0],
       slope: dose ?? at.numbers(SLOPE)[0] ?? 1,
       intercept: at.numbers(INTERCEPT)[0] ?? 0,
       marks: marksOf(at),
@@ -160,6 +168,9 @@ function offsetOf(at: FrameAttributes, index: number): number {
   const offset = offsets[index];
   // Either relative to the position of the image, or coordinates along the normal, which then begin with that position.
   if (offset !== undefined) return offset - (offsets[0] ?? 0);
+  const others = pointersOf(at.data).filter((tag) => !SLICE_POINTERS.includes(tag));
+  if (others.length > 0)
+    throw new Unusable('images of several times, angles or windows, without positions of their own');
   const [step] = at.numbers(SLICE_SPACING);
   if (step === undefined || step === 0 || !Number.isFinite(step))
     throw new Unusable('several images without positions of their own');
@@ -176,7 +187,7 @@ function directions(six: number[]): [Vec3, Vec3] {
 }
 
 /** Returns how voxels are stored; throws the reason if they are not single numbers. */
-function formatOf({ data, transferSyntax }: Header): PixelFormat {
+function formatOf({ data, transferSyntax }: Header, representation: string | undefined): PixelFormat {
   const photometric = textOf(data, 'x00280004');
   const samples = data.uint16('x00280002') ?? 1;
   if (samples !== 1 || /^(RGB|YBR|PALETTE|HSV|CMYK)/.test(photometric))
@@ -192,6 +203,7 @@ function formatOf({ data, transferSyntax }: Header): PixelFormat {
   const isSound = bitsStored > 0 && highBit >= bitsStored - 1;
   return {
     ...{ rows, columns, bitsAllocated, transferSyntax, float: float >= 0 },
+    inWords: bitsAllocated === 8 && representation === 'OW',
     bitsStored: isSound ? bitsStored : bitsAllocated,
     highBit: isSound ? highBit : bitsAllocated - 1,
     signed: data.uint16('x00280103') === 1,
@@ -206,6 +218,7 @@ function seriesOf(data: DataSet, transferSyntax: string): Series {
   const day = /^(\d{4})\.?(\d\d)\.?(\d\d)/.exec(textOf(data, 'x00080020') || textOf(data, 'x00080021'));
   return {
     uid: textOf(data, 'x0020000e'),
+    origin: originOf(data),
     sopClass: textOf(data, 'x00080016'),
     number: numberOf(data, 'x00200011'),
     description: textOf(data, 'x0008103e') || textOf(data, 'x00181030') || textOf(data, 'x00081030'),
@@ -224,11 +237,37 @@ function seriesOf(data: DataSet, transferSyntax: string): Series {
   };
 }
 
+/** Returns the date that belongs to a time, so that times after midnight are later; empty if there is none, or no time. */
+function dateOf(at: FrameAttributes, [tag]: Attribute): string {
+  const date = tag === 'x00080032' ? 'x00080022' : 'x00080023';
+  return at.text([tag]) === '' ? '' : at.text([date]);
+}
+
+/** Attributes that count slices: vectors of slices of nuclear medicine (PS3.3, C.8.4.8), and offsets of grids of doses. */
+const SLICE_POINTERS = ['00540080', '3004000c'];
+
+/** Returns the tags of the attributes that the frames of a file are counted by (Frame Increment Pointer). */
+function pointersOf(data: DataSet): string[] {
+  const count = Math.floor((data.elements.x00280009?.length ?? 0) / 4);
+  const hex = (k: number) => (data.uint16('x00280009', k) ?? 0).toString(16).padStart(4, '0');
+  return Array.from({ length: count }, (_, k) => hex(2 * k) + hex(2 * k + 1));
+}
+
+/** Returns what distinguishes series, besides their identifiers, which may have been removed. */
+function originOf(data: DataSet): string {
+  const tags = ['x00100020', 'x00100010', 'x0020000d', 'x00200011'];
+  const more = textOf(data, 'x0020000e') === '' ? ['x0008103e', 'x00080031'] : [];
+  return JSON.stringify([...tags, ...more].map((tag) => textOf(data, tag)));
+}
+
 function marksOf(at: FrameAttributes): Record<string, string | number> {
   const marks: Record<string, string | number> = {};
   for (const [name, kind, ...attribute] of MARKS) {
     if (marks[name] !== undefined) continue;
-    const value = kind === 'text' ? at.text(attribute) : at.numbers(attribute)[0];
+    const value =
+      kind === 'number'
+        ? at.numbers(attribute)[0]
+        : `${kind === 'time' ? dateOf(at, attribute) : ''}${at.text(attribute)}`;
     if (value !== undefined && value !== '') marks[name] = value;
   }
   return marks;

@@ -21,7 +21,7 @@ import { withPause } from '../pause.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import { badDicom } from './error.js';
 import { evennessOf } from './geometry.js';
-import { type Conflict, grouped, isParallel, type Stack, stacksOf } from './grouping.js';
+import { type Conflict, grouped, isNearlyParallel, type Stack, stacksOf } from './grouping.js';
 import { framesIn } from './header.js';
 import { importParser, type Parser, readHeader } from './parser.js';
 import { SegmentationVolume } from './segmentation.js';
@@ -122,7 +122,7 @@ const isNamedDicom = ({ name }: Source) => /\.(dcm|dicom|ima)$/i.test(name);
 
 /** Returns the volumes of images; adds those that are part of none to `skipped`. */
 function volumesOf(parser: Parser, images: readonly Frame[], skipped: Skipped[]): DicomVolume[] {
-  const damaged = skipped.filter((one) => one.damaged);
+  const damaged = skipped.filter((one) => one.damaged || one.series);
   const isSegment = ({ series }: Frame) => series.sopClass === SEGMENTATION || series.sopClass === LABEL_MAP;
   const skip = (group: readonly Frame[], reason: string) => {
     for (const name of new Set(group.map(({ file }) => file.name))) skipped.push({ name, reason });
@@ -135,9 +135,8 @@ function volumesOf(parser: Parser, images: readonly Frame[], skipped: Skipped[])
   const stacks = stacksOf(images.filter((image) => !isSegment(image))).map(usable);
   const left = stacks.filter((one) => 'reason' in one);
   for (const { images, reason } of left) skip(images, reason);
-  const volumes = stacks
-    .filter((one) => 'frames' in one)
-    .map((stack) => new ImageVolume(parser, { ...stack, ...beside(stack, left, damaged) }));
+  const whole = stacks.filter((one) => 'frames' in one);
+  const volumes = whole.map((stack) => new ImageVolume(parser, { ...stack, ...beside(stack, whole, left, damaged) }));
   return named([...volumes, ...segmentations]);
 }
 
@@ -152,22 +151,42 @@ function usable(stack: Stack | Conflict): Stack | Conflict {
 }
 
 /** Returns what should be known of images that are not part of a stack, but may be missing in it. */
-function beside(stack: Stack, left: Conflict[], damaged: Skipped[]): Pick<Stack, 'notes' | 'remarks'> {
+function beside(
+  stack: Stack,
+  stacks: readonly Stack[],
+  left: Conflict[],
+  damaged: Skipped[],
+): Pick<Stack, 'notes' | 'remarks'> {
   const [first] = stack.frames.flat() as [Frame];
   const notes = [...stack.notes];
   const remarks: string[] = [];
   for (const { images, reason } of left.filter(({ images }) => images[0]?.series.uid === first.series.uid)) {
     const count = images.length === 1 ? 'One image' : `${images.length} images`;
     const text = `${count} of the series ${images.length === 1 ? 'is' : 'are'} not part of the volume (${sizeOf(images)}): ${reason}.`;
-    const isLocaliser = images.every((image) => image.series.isLocaliser || !isParallel(image, first));
+    const isLocaliser = images.every((image) => image.series.isLocaliser || !isNearlyParallel(image, first));
     (isLocaliser ? remarks : notes).push(text);
   }
-  const files = damaged.map(({ name }) => name);
+  const files = damaged.filter((one) => one.damaged || one.series === first.series.uid).map(({ name }) => name);
   if (files.length > 0)
     notes.push(
       `${files.slice(0, 3).join(', ')}${files.length > 3 ? ` and ${files.length - 3} more` : ''} could not be read, and may be missing in the volume.`,
     );
+  if (stacks.some((other) => other !== stack && isPartOf(other, first)))
+    notes.push(
+      'Other images of the series differ in size, spacing, type of voxels or slightly in orientation: they are a volume of their own.',
+    );
   return { notes, remarks };
+}
+
+/** Whether a volume is of the series of an image and nearly parallel, without anything that was measured to distinguish it. */
+function isPartOf({ frames, label }: Stack, image: Frame): boolean {
+  const [one] = frames.flat();
+  const isSame =
+    one !== undefined &&
+    label === '' &&
+    one.series.uid === image.series.uid &&
+    one.series.origin === image.series.origin;
+  return isSame && isNearlyParallel(one, image);
 }
 
 const sizeOf = ([image]: Frame[]) => `${image?.format.columns} × ${image?.format.rows}`;

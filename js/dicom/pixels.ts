@@ -26,6 +26,9 @@ export class PixelReader {
   readonly #parser: Parser;
   readonly #decoders: Decoders;
   #last: { file: Source; data: DataSet } | undefined;
+  /** Files whose images were compressed with loss, and those that do not end as compressed images do. */
+  readonly lossy = new Set<string>();
+  readonly endless = new Set<string>();
 
   constructor(parser: Parser, decoders: Decoders) {
     this.#parser = parser;
@@ -47,10 +50,13 @@ export class PixelReader {
     const { transferSyntax } = image.format;
     if (PLAIN.includes(transferSyntax)) return this.#plain(image, voxels);
     const packed = await this.#compressed(image);
+    if (transferSyntax !== RLE && !hasEnd(packed)) this.endless.add(image.file.name);
     const decode: Decode =
       transferSyntax === RLE ? (bytes) => decodeRle(bytes, voxels) : await decoderOf(transferSyntax, this.#decoders);
     try {
-      return decode(packed);
+      const decoded = decode(packed);
+      if (decoded.lossy) this.lossy.add(image.file.name);
+      return decoded;
     } catch (error) {
       throw badDicom(image.file.name, `the compressed image could not be decoded: ${reasonOf(error)}`);
     }
@@ -68,6 +74,10 @@ export class PixelReader {
     const read = (start: number, end: number) => source?.subarray(start, end) ?? file.read(start, end);
     if (bitsAllocated === 1)
       return { bytes: shifted(await read(Math.floor(from), Math.ceil(to)), (from % 1) * 8), size };
+    if (format.inWords && transferSyntax === BIG_ENDIAN) {
+      const even = from - (from % 2);
+      return { bytes: swapped(await read(even, to + (to % 2)), 2).subarray(from - even), size };
+    }
     const bytes = await read(from, to);
     return { bytes: transferSyntax === BIG_ENDIAN ? swapped(bytes, size) : bytes, size };
   }
@@ -103,6 +113,15 @@ export class PixelReader {
     return new Uint8Array(parser.readEncapsulatedImageFrame(data, element, index, table));
   }
 }
+
+/** Whether a compressed image has the marker that ends images of the JPEG family, before padding. */
+function hasEnd(bytes: Uint8Array): boolean {
+  const tail = bytes.subarray(-END);
+  return tail.some((byte, k) => byte === 0xff && tail[k + 1] === 0xd9);
+}
+
+/** Number of bytes at the end of a compressed image in which its end marker is: the marker, and padding. */
+const END = 10;
 
 /** Returns bytes whose bits begin at `first` of the first byte. */
 function shifted(bytes: Uint8Array, first: number): Uint8Array {

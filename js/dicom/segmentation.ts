@@ -31,12 +31,19 @@ function slicesOf(images: readonly Frame[]): Slices | undefined {
     .slice(1)
     .map((distance, k) => distance - (distances[k] ?? 0))
     .filter((step) => step > OFF * least);
-  const step = Math.min(...steps, Infinity);
+  const step = stepOf(frames, distances, Math.min(...steps, Infinity));
   if (step === Infinity) return { frames, slices: frames.map(() => 0), count: 1 };
   const slices = distances.map((distance) => Math.round(distance / step));
   const count = (slices.at(-1) ?? 0) + 1;
   const isEven = distances.every((distance, k) => Math.abs(distance / step - (slices[k] ?? 0)) <= OFF);
   return isEven && count <= MOST_SLICES ? { frames, slices, count } : undefined;
+}
+
+/** Returns the distance between slices: that which the file states, if frames are at multiples of it, else the least one. */
+function stepOf([first]: readonly Frame[], distances: readonly number[], least: number): number {
+  const stated = Math.abs(first?.statedStep ?? 0);
+  const fits = distances.every((distance) => Math.abs(distance / stated - Math.round(distance / stated)) <= OFF);
+  return stated > 0 && least !== Infinity && fits ? stated : least;
 }
 
 /** A volume of labels. */
@@ -55,7 +62,7 @@ export class SegmentationVolume extends DicomVolume {
   private constructor(parser: Parser, slices: Slices) {
     const { frames, count } = slices;
     const [first] = frames as [Frame];
-    const affine = affineOf(frames, count);
+    const affine = affineOf(frames, count, Math.abs(first.statedStep ?? 0) || 1);
     super(first.series, '', {
       dims: [first.format.columns, first.format.rows, count],
       spacing: spacingOf(affine),

@@ -10,6 +10,8 @@ export interface PixelFormat {
   bitsStored: number;
   highBit: number;
   signed: boolean;
+  /** Whether voxels of 8 bits are stored as words of 16, whose order of bytes then matters. */
+  inWords: boolean;
   /** Whether voxels are floats: Float or Double Float Pixel Data. */
   float: boolean;
   transferSyntax: string;
@@ -38,7 +40,9 @@ export interface Frame {
   spacing: [number, number];
   slope: number;
   intercept: number;
-  /** Values that tell images at the same position apart, by the name of the attribute. */
+  /** Distance between slices that the file states, millimetres; used for segmentations, which leave slices out. */
+  statedStep: number | undefined;
+  /** Values that distinguish images at the same position, by the name of the attribute. */
   marks: Record<string, string | number>;
   /** Whether only the first image of the file has a position, and the others follow at a distance that the file states. */
   isChained: boolean;
@@ -49,6 +53,8 @@ export interface Frame {
 /** Attributes that all images of a series have in common. */
 export interface Series {
   uid: string;
+  /** Identifiers of patient and study, and what else distinguishes series whose own identifiers were removed. */
+  origin: string;
   /** Class of the objects. */
   sopClass: string;
   number: number | undefined;
@@ -86,6 +92,9 @@ export interface Segment {
 export interface Skipped {
   name: string;
   reason: string;
+  /** Identifier of the series that the file is of, if it could be read.
+   * @internal */
+  series?: string;
   /** Whether it should have been read, but could not. */
   damaged?: boolean;
 }

@@ -217,12 +217,19 @@ export class ImageVolume extends DicomVolume {
       ...(frames.length > 1 && this.#seconds !== undefined && { frameSeconds: this.#seconds }),
       space: 'LPS',
       unit: 'mm',
-      ...withWarnings([...this.warnings, ...interpolated(this.uneven)]),
+      ...withWarnings([...this.warnings, ...interpolated(this.uneven), ...foundIn(pixels, first.series)]),
     };
   }
 }
 
 const withWarnings = (warnings: Warning[]) => (warnings.length > 0 ? { warnings } : {});
+
+/** Returns warnings about compressed images, which are known once they are read. */
+function foundIn({ lossy, endless }: PixelReader, series: Series): Warning[] {
+  const files = [...endless];
+  const text = `${files.slice(0, 3).join(', ')}${files.length > 3 ? ` and ${files.length - 3} more` : ''} may be cut off or damaged: the compressed image has no end.`;
+  return [...(lossy.size > 0 && !series.lossy ? [reader(LOSSY)] : []), ...(files.length > 0 ? [reader(text)] : [])];
+}
 
 function interpolated(uneven: string | undefined): Warning[] {
   if (uneven === undefined) return [];
@@ -230,12 +237,13 @@ function interpolated(uneven: string | undefined): Warning[] {
   return [reader(`${reason}. Slices at equal distances were interpolated between their neighbours.`)];
 }
 
+const LOSSY = 'The images were compressed with loss: intensities differ from those that were measured.';
+
 /** Returns reasons to doubt intensities or positions that concern all images. */
-function doubtsOn({ series, isChained }: Frame): string[] {
+function doubtsOn({ series, isChained, slope }: Frame): string[] {
   return [
-    ...(series.lossy
-      ? ['The images were compressed with loss: intensities differ from those that were measured.']
-      : []),
+    ...(slope === 0 ? ['The slope of intensities is 0, which cannot be: values are as stored.'] : []),
+    ...(series.lossy ? [LOSSY] : []),
     ...(series.hasTable
       ? ['Intensities are given by a table in the file, which is not applied: values are as stored.']
       : []),

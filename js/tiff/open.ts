@@ -4,6 +4,7 @@ import type { Pause } from '../pause.js';
 import { isTiff, readPages, TAG } from './directory.js';
 import { badTiff } from './error.js';
 import { type Channel, type Layout, type OpenFile, stackOf } from './layout.js';
+import { warningOfNames } from './numbered.js';
 import { isOme, parseOme } from './ome.js';
 import { namedFiles, type OmeFile } from './ome-files.js';
 import { omeStack } from './ome-layout.js';
@@ -72,6 +73,8 @@ async function joined(files: OpenFile[], stackIn: (file: OpenFile & OmeFile) => 
   const warnings = new Set(parts.flatMap((part) => part.warnings));
   if (parts.some((part) => part.slices > 1))
     warnings.add(`slices of ${parts.length} files are joined along z, in the order of the names of the files`);
+  const ofNames = warningOfNames(files.map(({ source }) => source.name));
+  if (ofNames) warnings.add(ofNames);
   return { ...first, channels: first.channels.map((_, c) => joinedChannel(parts, c)), slices, warnings: [...warnings] };
 }
 

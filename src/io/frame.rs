@@ -66,8 +66,8 @@ impl Frame {
         self.space_name().map_or(String::new(), |name| format!("{start}SPACE={name}"))
     }
 
-    /// Returns the transform from positions to glTF's space, in metres, with x to the right of the patient, y upwards and z
-    /// to the front. Without a space, axes are kept; without a unit, lengths.
+    /// Returns the transform from positions to glTF's space, in metres, with x to the left of the patient, y upwards and z to
+    /// the front, which viewers show. Without a space, axes are kept; without a unit, lengths.
     fn to_gltf(self) -> DAffine3 {
         let scale = match self.unit {
             LengthUnit::Metre | LengthUnit::Unknown => 1.0,
@@ -76,8 +76,8 @@ impl Frame {
         };
         let axes = match self.space {
             None => DMat3::IDENTITY,
-            Some(Space::Ras) => DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y),
-            Some(Space::Lps) => DMat3::from_cols(DVec3::NEG_X, DVec3::Z, DVec3::Y),
+            Some(Space::Ras) => DMat3::from_cols(DVec3::NEG_X, DVec3::Z, DVec3::Y),
+            Some(Space::Lps) => DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y),
         };
         DAffine3::from_mat3(axes * scale)
     }

@@ -132,8 +132,8 @@ fn a_glb_is_in_metres_with_y_upwards_and_read_as_it_was() {
                 assert!((width - 160.0).abs() + (height - 200.0).abs() + (depth - 180.0).abs() < 1e-3);
                 let expected = measure(&mesh).volume * scale * scale * scale;
                 assert!((found.volume - expected).abs() < 1e-5 * expected, "not mirrored");
-                // To the front, which is y in RAS, is z in glTF.
-                let front = DVec3::new(f64::from(nose.x), f64::from(nose.z), -f64::from(nose.y)) * scale;
+                // To the patient's left, which is -x in RAS, is x in glTF; upwards is y, to the front is z.
+                let front = DVec3::new(-f64::from(nose.x), f64::from(nose.z), f64::from(nose.y)) * scale;
                 let mut corners = (0..seen.positions.len()).map(|v| seen.world_position(v));
                 assert!(corners.any(|p| (p - front).length() < 1e-4 * scale), "{front}");
 
@@ -173,7 +173,7 @@ fn far_meshes_keep_their_precision_beneath_the_root() {
         }
         let seen = shown(&bytes);
         let middle = measure(&seen).centroid;
-        assert!((middle - DVec3::new(5e5 + 0.01, 1e5 + 0.03, 4.25e6 + 0.02)).length() < 1e-3, "{middle}");
+        assert!((middle - DVec3::new(-5e5 - 0.01, 1e5 + 0.03, -4.25e6 - 0.02)).length() < 1e-3, "{middle}");
     }
 }
 
@@ -206,14 +206,14 @@ fn a_root_that_was_moved_is_a_node_like_any_other() {
     let json_length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
     let json = String::from_utf8(bytes[20..20 + json_length].to_vec()).unwrap();
     let binary = &bytes[28 + json_length..];
-    let matrix = r#""matrix":[0.001,0,0,0,0,0,-0.001,0,0,0.001,0,0,0,0,0,1]"#;
+    let matrix = r#""matrix":[-0.001,0,0,0,0,0,0.001,0,0,0.001,0,0,0,0,0,1]"#;
     assert!(json.contains(matrix), "{json}");
     let with = |to: &str| read(&glb(&json.replace(matrix, to), binary));
     // As another program may write the same.
-    let same = r#""rotation":[-0.7071068,0,0,0.7071068],"scale":[0.001,0.0010000000474974513,0.001]"#;
+    let same = r#""rotation":[0,0.7071068,0.7071068,0],"scale":[0.001,0.0010000000474974513,0.001]"#;
     assert_eq!(with(same).space, Some(Space::Ras));
     assert_eq!(with(same).mesh.positions, head().welded().positions);
     let moved = with(&matrix.replace("0,0,0,1]", "0,2,0,1]"));
     assert_eq!((moved.space, moved.unit), (None, LengthUnit::Unknown));
-    assert!((measure(&moved.mesh).centroid - DVec3::new(0.01, 2.03, 0.02)).length() < 1e-6);
+    assert!((measure(&moved.mesh).centroid - DVec3::new(-0.01, 2.03, -0.02)).length() < 1e-6);
 }

@@ -111,6 +111,15 @@ describe('a series', () => {
     expect(slicesOf(late)[4]?.[7]).toBeCloseTo((voxels(4)[7] ?? 0) * 0.37, 3);
   });
 
+  test('of 8 bits in words, big-endian', async () => {
+    const values = Buffer.from(Uint8Array.from({ length: SIZE }, (_, i) => i));
+    const bits = { '00280100': ['US', [8]], '00280101': ['US', [8]], '00280102': ['US', [7]] } as const;
+    const files = series(() => ({ ...bits, '7fe00010': ['OW', Buffer.from(values).swap16()] }), {
+      writing: { syntax: 'big' },
+    });
+    expect(slicesOf(await readDicom(files))[0]).toEqual([...values]);
+  });
+
   test('of 12 bits, signed, in 16: the other bits do not count', async () => {
     const values = Uint16Array.from({ length: SIZE }, (_, i) => ((i - 10) & 0xfff) | (i % 2 ? 0xf000 : 0));
     const bits = { '00280101': ['US', [12]], '00280102': ['US', [11]], '00280103': ['US', [1]] } as const;
@@ -278,6 +287,59 @@ describe('a folder', () => {
   });
 });
 
+describe('images of one series', () => {
+  test.each<[string, Elements, Elements]>([
+    ['kernel', { '00181210': ['SH', 'B30f'] }, { '00181210': ['SH', 'B70f'] }],
+    ['echo time', { '00180081': ['DS', '10'] }, { '00180081': ['DS', '90'] }],
+    ['thickness', { '00180050': ['DS', '1'] }, { '00180050': ['DS', '5'] }],
+    ['flip angle', { '00181314': ['DS', '2'] }, { '00181314': ['DS', '15'] }],
+    ['b-value', { '0019100c': ['IS', '0'] }, { '0019100c': ['IS', '1000'] }],
+  ])('of which every second one has another %s are two volumes', async (name, one, other) => {
+    const { volumes } = await openDicom(series((z) => (z % 2 ? other : one)));
+    expect(volumes.map((volume) => [volume.dims[2], volume.spacing[2]])).toEqual([
+      [3, 4],
+      [3, 4],
+    ]);
+    for (const volume of volumes) expect(volume.name).toMatch(`Body, ${name} `);
+  });
+
+  test('with the same distance but beside each other are several volumes', async () => {
+    const beside = series((z) => ({ ...moved(z, () => [50, 0, 0]), '00080018': ['UI', `1.2.3.5.${z}`] }));
+    const { volumes } = await openDicom([...series(), ...beside]);
+    expect(volumes.map(({ dims, frames }) => [...dims, frames])).toEqual([
+      [5, 4, 6, 1],
+      [5, 4, 6, 1],
+    ]);
+    const firsts = await Promise.all(volumes.map(async (volume) => (await volume.read()).affine?.[12]));
+    expect(firsts.sort()).toEqual([10, 60]);
+  });
+
+  test('of two patients, whose identifiers were removed, are two volumes', async () => {
+    const of = (patient: string, slices: number[]) =>
+      series(() => ({ '0020000e': ['UI', ''], '00080018': ['UI', ''], '00100020': ['LO', patient] }), { slices });
+    const { volumes } = await openDicom([...of('1', [0, 1, 2]), ...of('2', ALL)]);
+    expect(volumes.map(({ dims }) => dims[2])).toEqual([6, 3]);
+  });
+
+  test('with directions that are rounded differently are one volume; with others, each volume says so', async () => {
+    const rounded = series((z) => (z === 5 ? { '00200037': ['DS', '1\\0.001\\0\\-0.001\\1\\0'] } : {}));
+    expect((await only(rounded)).dims[2]).toBe(6);
+    const flipped = series((z) => (z % 2 ? { '00200037': ['DS', '-1\\0\\0\\0\\-1\\0'] } : {}));
+    const { volumes } = await openDicom(flipped);
+    expect(volumes).toHaveLength(2);
+    for (const volume of volumes) expect(texts(volume).join()).toMatch(/Other images of the series differ/);
+  });
+
+  test('without pixels or position may be missing: the volume says so', async () => {
+    for (const gone of [{ '7fe00010': ['OW', Buffer.alloc(0)] }, { '00200032': ['DS', ''] }] as Elements[]) {
+      const { volumes } = await openDicom(series((z) => (z === 5 ? gone : {})));
+      const [volume] = volumes as [DicomVolume];
+      const read = await volume.read().catch((error: Error) => error);
+      expect(read instanceof Error ? read.message : texts(volume).join()).toMatch(/may be missing|needs 40 bytes/);
+    }
+  });
+});
+
 describe('images at the same position', () => {
   const twice = (mark: (time: number, z: number) => Elements) =>
     [0, 1].flatMap((time) =>
@@ -297,6 +359,11 @@ describe('images at the same position', () => {
       0.05,
     ],
     ['acquisition time', (time, z) => ({ '00080032': ['TM', `1011${10 + 2 * time}.${z}`] }), 2],
+    [
+      'acquisition time, across midnight',
+      (time) => ({ '00080022': ['DA', `2024013${time}`], '00080032': ['TM', time ? '000010' : '235950'] }),
+      20,
+    ],
     ['acquisition', (time) => ({ '00200012': ['IS', String(4 + time)] }), 0],
   ])('are frames of a volume with time: %s', async (_, mark, seconds) => {
     const volume = await only(twice(mark));
@@ -356,6 +423,7 @@ describe('multi-frame files', () => {
     async (name) => {
       const init = await readDicom(await file(`${name}.dcm`));
       expect(init).toMatchObject({ dims: [16, 12, 3], slope: 2, intercept: -1000 });
+      expect(init.warnings ?? []).toHaveLength(name === 'jpeg' ? 1 : 0);
       for (const [k, x] of [0, 0.75, 0, 0, 0, 0, -0.5, 0, -1.5, 0, 0, 0, -7, 20, 30, 1].entries())
         expect(init.affine?.[k]).toBeCloseTo(x, 12);
       const value = (x: number, y: number, z: number) =>
@@ -378,6 +446,51 @@ describe('multi-frame files', () => {
       // A decoder may return something else for a damaged image; it must not crash.
       if (result instanceof Error) expect(result).toMatchObject({ code: expect.stringMatching(/bad-file/) });
     }
+  });
+
+  test('a compressed image that is cut off carries a warning, if its decoder does not refuse it', async () => {
+    for (const name of ['jpeg-lossless', 'jpeg-2000', 'htj2k']) {
+      const [{ bytes }] = (await file(`${name}.dcm`)) as [Given];
+      // Zeroes in place of the end of the last image, before the item that ends the sequence.
+      const cut = bytes.map((byte, k) => (k > bytes.length - 60 && k < bytes.length - 8 ? 0 : byte));
+      const found = await readDicom([{ name, bytes: cut }]).catch((error: { code: string }) => error);
+      if ('code' in found) expect(found.code).toBe('bad-file');
+      else expect(found.warnings?.map(({ text }) => text).join()).toMatch(/may be cut off or damaged/);
+    }
+  });
+
+  test('several grids of doses in one series are volumes of their own', async () => {
+    const dose = (number: number) =>
+      dicomFile({
+        ...sliceElements(GRID, 0, voxels(0)),
+        '00080018': ['UI', `1.2.3.4.${number}`],
+        '00280008': ['IS', '3'],
+        '3004000c': ['DS', '0\\2.5\\5'],
+        '7fe00010': ['OW', Buffer.concat([0, 1, 2].map((z) => Buffer.from(voxels(z + number).buffer)))],
+      });
+    const { volumes } = await openDicom([1, 2].map((n) => ({ name: `dose ${n}`, bytes: new Uint8Array(dose(n)) })));
+    expect(volumes.map(({ name }) => name)).toEqual(['Body, file dose 1', 'Body, file dose 2']);
+  });
+
+  test.each([
+    ['several times', { '00280009': ['AT', [0x0054, 0x0070, 0x0054, 0x0080]] }],
+    ['time alone', { '00280009': ['AT', [0x0018, 0x1063]] }],
+    ['angles', { '00280009': ['AT', [0x0054, 0x0090]] }],
+  ] as [string, Elements][])('frames that are counted by %s, without positions, are no volume', async (_, pointer) => {
+    const bytes = dicomFile({
+      ...sliceElements(GRID, 0, voxels(0)),
+      ...pointer,
+      '00180088': ['DS', '2.5'],
+      '00280008': ['IS', '3'],
+    });
+    await expect(readDicom([{ name: 'nm', bytes: new Uint8Array(bytes) }])).rejects.toMatchObject(
+      refused(/several times, angles or windows/),
+    );
+  });
+
+  test('a mosaic of slices is no volume', async () => {
+    const files = series(() => ({ '00080008': ['CS', 'ORIGINAL\\PRIMARY\\M\\MOSAIC'] }));
+    await expect(readDicom(files)).rejects.toMatchObject(refused(/mosaic of slices/));
   });
 
   test('a grid of doses is placed by its offsets', async () => {
@@ -417,6 +530,44 @@ describe('multi-frame files', () => {
 });
 
 describe('segmentations', () => {
+  /** Returns a segmentation with one segment of a voxel on each of some slices, at multiples of 2.5 mm. */
+  function sparse(slices: number[], spacing?: string): Given[] {
+    const bytes = dicomFile({
+      ...sliceElements(GRID, 0, voxels(0)),
+      '00080016': ['UI', '1.2.840.10008.5.1.4.1.1.66.4'],
+      '00280008': ['IS', String(slices.length)],
+      '00280100': ['US', [8]],
+      '00280101': ['US', [8]],
+      '00280102': ['US', [7]],
+      '00620002': ['SQ', [{ '00620004': ['US', [1]], '00620005': ['LO', 'Lesion'] }]],
+      '52009229': ['SQ', [spacing ? { '00289110': ['SQ', [{ '00180088': ['DS', spacing] }]] } : {}]],
+      '52009230': [
+        'SQ',
+        slices.map(
+          (z): Elements => ({
+            '00209113': ['SQ', [{ '00200032': ['DS', `10\\20\\${30 + 2.5 * z}`] }]],
+            '0062000a': ['SQ', [{ '0062000b': ['US', [1]] }]],
+          }),
+        ),
+      ],
+      '7fe00010': ['OB', Buffer.from(slices.flatMap(() => [1, ...new Array(SIZE - 1).fill(0)]))],
+    });
+    return [{ name: 'seg', bytes: new Uint8Array(bytes) }];
+  }
+
+  test.each([[[0, 4]], [[0, 2, 4]], [[1, 4, 6]], [[3]]])(
+    'leave out slices without segments: frames on slices %j of 2.5 mm',
+    async (slices) => {
+      const [first = 0] = slices;
+      const count = (slices.at(-1) ?? 0) - first + 1;
+      const volume = await only(sparse(slices, '2.5'));
+      expect(volume).toMatchObject({ dims: [5, 4, count], spacing: [0.5, 0.75, 2.5] });
+      const { data } = await volume.read();
+      const filled = Array.from({ length: count }, (_, z) => data[z * SIZE]);
+      expect(filled).toEqual(Array.from({ length: count }, (_, z) => (slices.includes(first + z) ? 1 : 0)));
+    },
+  );
+
   /** Returns the labels of the files, computed as by the script that made them; those of slices 2 to 10. */
   const labels = Array.from({ length: 20 * 16 * 9 }, (_, i) => {
     const [x, y, z] = [i % 20, Math.floor(i / 20) % 16, Math.floor(i / 320) + 2];

@@ -91,7 +91,8 @@ test('a head is 0.2 m high in three.js, its nose towards z', async () => {
       const box = await seen(glb);
       const [right, front, up] = size.map((x) => Math.round(10 * x));
       expect(rounded(box.getSize(new Vector3()), 1e4)).toEqual([right, up, front]);
-      expect(rounded(box.getCenter(new Vector3()), 1e3)).toEqual([10, 30, 20]);
+      // The middle is 10 mm to the right, 20 to the back and 30 up.
+      expect(rounded(box.getCenter(new Vector3()), 1e3)).toEqual([-10, 30, -20]);
     }
   }
   const plain = await seen(head().toBytes('glb'));

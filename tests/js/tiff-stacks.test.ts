@@ -452,8 +452,19 @@ describe('several files', () => {
   };
 
   test('have a slice each, in the order of the numbers in their names', async () => {
-    const files = [10, 9, 2, 1].map((k) => one(k));
-    expect(await pagesIn(files)).toEqual({ pages: [1, 2, 9, 10], dims: [5, 3, 4], warnings: '' });
+    const files = [10, 9, 11, 8].map((k) => one(k));
+    expect(await pagesIn(files)).toEqual({ pages: [8, 9, 10, 11], dims: [5, 3, 4], warnings: '' });
+  });
+
+  test('of whose numbers one is missing, or which count two things, have a warning', async () => {
+    const named = (...names: string[]) => pagesIn(names.map((name, k) => ({ ...one(k), name })));
+    const every = await named('scan 1/a_05.tif', 'scan 1/a_10.tif', 'scan 1/a_15.tif');
+    expect([every.pages, every.warnings]).toEqual([[0, 1, 2], '']);
+    const gaps = await named('a_01.tif', 'a_02.tif', 'a_04.tif', 'a_05.tif', 'a_09.tif');
+    expect(gaps.warnings).toMatch(/missing between the files numbered 2 and 4, and elsewhere \(2 places\): /);
+    const channels = await named('a_z1_c1.tif', 'a_z1_c2.tif', 'a_z2_c1.tif', 'a_z2_c2.tif');
+    expect(channels.warnings).toMatch(/differ in 2 numbers, of which one may count channels/);
+    expect((await named('bottom.tif', 'middle.tif', 'top.tif')).warnings).toBe('');
   });
 
   test('have a slice each, each with a description of its own', async () => {

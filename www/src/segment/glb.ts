@@ -34,11 +34,11 @@ export async function toGlb(
   return new Uint8Array(result);
 }
 
-/** Returns the node that maps positions to metres, with x to the right of the patient, y upwards and z to the front. */
+/** Returns the node that maps positions to metres, with x to the left of the patient, y upwards and z to the front. */
 function rootOf({ space, unit }: Pick<ExportRequest, 'space' | 'unit'>): Group {
   const root = new Group();
   const scale = unit ? METRES[unit] : 1;
-  const [x, y] = space === 'LPS' ? [-scale, scale] : [scale, -scale];
+  const [x, y] = space === 'LPS' ? [scale, -scale] : [-scale, scale];
   if (space) root.matrix.set(x, 0, 0, 0, 0, 0, scale, 0, 0, y, 0, 0, 0, 0, 0, 1);
   else root.matrix.makeScale(scale, scale, scale);
   root.matrix.decompose(root.position, root.quaternion, root.scale);
