@@ -1,7 +1,7 @@
 import { checkProperties, denseCopy, invalid, number } from './check.js';
 import type { SpaceOptions } from './data.js';
 import { type Mesh, meshHandle } from './mesh.js';
-import { checkedSpaceOptions, SPACE_OPTIONS } from './mesh-file.js';
+import { checkedSpaceOptions, frameOf, SPACE_OPTIONS } from './mesh-file.js';
 import { call } from './runtime.js';
 import { RawAnimation } from './vesicle.js';
 import { mergedWarnings, notesOf } from './warnings.js';
@@ -18,7 +18,7 @@ import { mergedWarnings, notesOf } from './warnings.js';
  * @param frames - At least one. The live mesh of a model has only the present state of the model: add a `clone()` of it
  *   for each frame.
  * @param options - `frameSeconds`: duration of each frame in seconds, 0.001 to 1000; default 0.1. `space`, `as` and
- *   `unit`: what to state, as in {@link Mesh.toBytes}.
+ *   `unit`: what to state, as in {@link Mesh.toBytes}, default those of the first frame.
  * @throws {@link VesicleError} `invalid-argument`: no frame with triangles, an entry that is no mesh, a duration out of
  *   range; `too-large`: more than there is memory for, or than a glb can hold, 4 GiB; `freed`: a mesh that was
  *   freed.
@@ -28,11 +28,11 @@ export function animationGlb(
   options: SpaceOptions & { frameSeconds?: number } = {},
 ): Uint8Array {
   const { frameSeconds = 0.1, ...given } = checkProperties('options', options, ['frameSeconds', ...SPACE_OPTIONS]);
-  const frame = checkedSpaceOptions(given);
   number('frameSeconds', frameSeconds, { min: 0.001, max: 1000 });
   const meshes = denseCopy('frames', frames);
   if (meshes.length === 0) throw invalid('frames', 'must contain at least one Mesh');
   const handles = meshes.map((frame, at) => meshHandle(`frames[${at}]`, frame));
+  const frame = checkedSpaceOptions(given, frameOf(meshes[0]));
   const notes = notesOf(mergedWarnings(...meshes.map(({ warnings }) => warnings)));
   const animation = call(() => new RawAnimation(notes, ...frame));
   try {

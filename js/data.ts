@@ -136,9 +136,9 @@ export interface MeshExtra {
   colors?: Float32Array;
   /** The image that texture coordinates refer to. */
   texture?: MeshTexture;
-  /** The directions of the axes, if the file that it is from states them, for `Mesh.space`. */
+  /** The directions of the axes, if they are known, for `Mesh.space`. */
   space?: Space;
-  /** The length of a unit, if the file that it is from states it, for `Mesh.unit`. */
+  /** The length of a unit, if it is known, for `Mesh.unit`. */
   unit?: LengthUnit;
   /** Findings of the file's reader, for `Mesh.warnings`; kinds of its own have the code `reader`. */
   warnings?: readonly Warning[];
@@ -155,20 +155,17 @@ export interface MeshFileOptions {
   files?: readonly NamedFile[];
 }
 
-/**
- * Statements about positions in a file. A mesh does not know them: give `space` and `unit` of the volume that it is
- * from, or those of {@link Mesh} if it is from a file.
- */
+/** Statements about positions in a file. */
 export interface SpaceOptions {
-  /** Directions of the axes of the mesh. */
-  space?: Space;
+  /** Directions of the axes of the mesh; default `Mesh.space`; null to state none. */
+  space?: Space | null;
   /**
    * Directions of the axes in the file, if they are to be others: x and y are then negated, a rotation by 180° about z.
-   * Not without `space`.
+   * Not without a space.
    */
   as?: Space;
-  /** Length of a unit of positions. */
-  unit?: LengthUnit;
+  /** Length of a unit of positions; default `Mesh.unit`; null to state none. */
+  unit?: LengthUnit | null;
 }
 
 /** The content of a mesh file: the arguments of `Mesh.fromArrays`. */

@@ -14,6 +14,7 @@ import { type Coverage, type CoverageOptions, checkedCoverage } from './coverage
 import type { DataOptions, LargeVolume, PointArray, Vec3, VoxelArray } from './data.js';
 import { NeedsDataError } from './error.js';
 import { Mesh, meshHandle, wrapMesh } from './mesh.js';
+import { frameOf } from './mesh-file.js';
 import { Handle } from './runtime.js';
 import { type SparseBox, type SparseSource, sparseSource, supply } from './sparse.js';
 import {
@@ -229,7 +230,8 @@ export class DeformableModel implements Stepper {
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     const start = options.start instanceof Mesh ? options.start.warnings : [];
     this.#warnings = new ModelWarnings((source ?? (options.volume as Volume)).warnings, start);
-    this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of());
+    const frame = frameOf(source ? { space: undefined, unit: source.unit } : (options.volume as Volume));
+    this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of(), frame);
   }
 
   /**

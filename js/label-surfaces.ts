@@ -1,6 +1,7 @@
 import { checkProperties, denseCopy, integer, number, shallowCopy, typedArray } from './check.js';
 import type { Vec3 } from './data.js';
 import { type Mesh, wrapMesh } from './mesh.js';
+import { frameOf, type MeshFrame } from './mesh-file.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawLabelSurfaces } from './vesicle.js';
@@ -50,6 +51,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
   readonly #meshes = new Map<number, { mesh: Mesh; handle: Handle<import('./vesicle.js').RawMesh> }>();
   readonly #runner = new Runner();
   readonly #warnings: ModelWarnings;
+  readonly #frame: MeshFrame;
 
   /**
    * Creates the surfaces along the faces of the voxels; the first steps smooth them.
@@ -62,6 +64,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
     const image = volumeHandle('volume', volume);
     const wanted = labels && Float64Array.from(denseCopy('labels', labels), (label) => number('labels', label));
     this.#volume = volume;
+    this.#frame = frameOf(volume);
     this.#warnings = new ModelWarnings(volume.warnings);
     this.#handle = new Handle('LabelSurfaces', () => image.use((raw) => new RawLabelSurfaces(raw, wanted, params)));
   }
@@ -88,7 +91,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
     let known = this.#meshes.get(label);
     if (!known) {
       const handle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh(label)));
-      known = { handle, mesh: wrapMesh(handle, true, () => this.#warnings.of({ label })) };
+      known = { handle, mesh: wrapMesh(handle, true, () => this.#warnings.of({ label }), this.#frame) };
       this.#meshes.set(label, known);
     }
     return known.mesh;

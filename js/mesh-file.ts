@@ -8,20 +8,33 @@ import type { Warning } from './warning.js';
 const SPACES: readonly Space[] = ['RAS', 'LPS'];
 const UNITS: readonly LengthUnit[] = ['m', 'mm', 'um'];
 
+/** The known space and unit of positions. */
+export type MeshFrame = Pick<MeshExtra, 'space' | 'unit'>;
+
+/** Returns the known space and unit of positions in the world of a volume or mesh; none for undefined. */
+export function frameOf(
+  one: { readonly space: Space | undefined; readonly unit: LengthUnit | undefined } | undefined,
+): MeshFrame {
+  return { ...(one?.space && { space: one.space }), ...(one?.unit && { unit: one.unit }) };
+}
+
 /** Names of the {@link SpaceOptions}. */
 export const SPACE_OPTIONS = ['space', 'as', 'unit'] as const;
 
-/** Returns space, space in the file, and unit for the WebAssembly module, empty where they are not given. */
-export function checkedSpaceOptions({ space, as, unit }: SpaceOptions): [space: string, as: string, unit: string] {
+/** Returns space, space in the file, and unit for the WebAssembly module, empty for none; those of `known` by default. */
+export function checkedSpaceOptions(given: SpaceOptions, known: MeshFrame): [space: string, as: string, unit: string] {
+  const { as } = given;
+  const space = given.space === null ? undefined : (given.space ?? known.space);
+  const unit = given.unit === null ? undefined : (given.unit ?? known.unit);
   checkStated({ ...(space && { space }), ...(unit && { unit }) });
   if (as === undefined) return [space ?? '', '', unit ?? ''];
   choice('as', as, SPACES);
-  if (space === undefined) throw invalid('as', 'needs space as well, that of the mesh');
+  if (space === undefined) throw invalid('as', 'needs space as well, that of the mesh, which is not known');
   return [space, as, unit ?? ''];
 }
 
 /** Throws `invalid-argument` for a space or unit that there is not. */
-export function checkStated({ space, unit }: Pick<MeshExtra, 'space' | 'unit'>): void {
+export function checkStated({ space, unit }: MeshFrame): void {
   if (space !== undefined) choice('space', space, SPACES);
   if (unit !== undefined) choice('unit', unit, UNITS);
 }

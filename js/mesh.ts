@@ -24,7 +24,15 @@ import type {
   SpaceOptions,
   Vec3,
 } from './data.js';
-import { checkedFileOptions, checkedSpaceOptions, checkStated, SPACE_OPTIONS, stated } from './mesh-file.js';
+import {
+  checkedFileOptions,
+  checkedSpaceOptions,
+  checkStated,
+  frameOf,
+  type MeshFrame,
+  SPACE_OPTIONS,
+  stated,
+} from './mesh-file.js';
 import { call, Handle } from './runtime.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
 // Entry points without readers of files lack `RawMeshFile`, which an import by name would demand.
@@ -193,11 +201,8 @@ export let wrapMesh: (
   handle: Handle<RawMesh>,
   live: boolean,
   warnings: () => readonly Warning[],
-  frame?: Frame,
+  frame?: MeshFrame,
 ) => Mesh;
-
-/** Statements of the file of a mesh about its positions. */
-type Frame = Pick<MeshExtra, 'space' | 'unit'>;
 
 /**
  * A triangle mesh.
@@ -212,7 +217,7 @@ export class Mesh {
   readonly #handle: Handle<RawMesh>;
   readonly #live: boolean;
   readonly #warnings: () => readonly Warning[];
-  readonly #frame: Frame;
+  #frame: MeshFrame;
 
   static {
     wrapMesh = (...parts) => new Mesh(...parts);
@@ -222,7 +227,12 @@ export class Mesh {
     };
   }
 
-  private constructor(handle: Handle<RawMesh>, live: boolean, warnings: () => readonly Warning[], frame: Frame = {}) {
+  private constructor(
+    handle: Handle<RawMesh>,
+    live: boolean,
+    warnings: () => readonly Warning[],
+    frame: MeshFrame = {},
+  ) {
     if (!(handle instanceof Handle)) {
       throw invalid('Mesh', 'has no public constructor; use icosphere, fromArrays, parse or marchingCubes');
     }
@@ -310,7 +320,10 @@ export class Mesh {
     integer('frame', frame);
     const handle = volumeHandle('volume', volume);
     return handle.use((raw) =>
-      made(() => RawMesh.marchingCubes(raw, iso, frame), { warnings: inFrame(volume.warnings, frame) }),
+      made(() => RawMesh.marchingCubes(raw, iso, frame), {
+        ...frameOf(volume),
+        warnings: inFrame(volume.warnings, frame),
+      }),
     );
   }
 
@@ -358,15 +371,15 @@ export class Mesh {
   }
 
   /**
-   * The directions of the axes that the file of the mesh states, in the way of 3D Slicer or as {@link Mesh.toBytes} does;
-   * undefined if it states none, and for meshes that are not from a file: those of models and volumes are in the space
-   * of their volume. Copies and edits keep it.
+   * The directions of the axes: those of the volume that the mesh or its model is from, or those that its file states, in
+   * the way of 3D Slicer or as {@link Mesh.toBytes} does; undefined if neither is there. Copies and edits keep it, but for
+   * {@link Mesh.transform}.
    */
   get space(): Space | undefined {
     return this.#handle.use(() => this.#frame.space);
   }
 
-  /** The length of a unit that the file of the mesh states; undefined where {@link Mesh.space} may be. */
+  /** The length of a unit that the volume or the file of the mesh states, as for {@link Mesh.space}. */
   get unit(): LengthUnit | undefined {
     return this.#handle.use(() => this.#frame.unit);
   }
@@ -553,7 +566,8 @@ export class Mesh {
 
   /**
    * Transforms the mesh by an affine map. A reflection reverses the triangles, so that they still face outwards.
-   * Normals of a file are transformed, too, and texture coordinates and colours stay.
+   * Normals of a file are transformed, too, and texture coordinates and colours stay. {@link Mesh.space} and
+   * {@link Mesh.unit} become undefined, since they may no longer be those of the positions.
    *
    * Entry points with one method lack it.
    *
@@ -565,6 +579,7 @@ export class Mesh {
   transform(matrix: ArrayLike<number>): void {
     const entries = numbers('matrix', matrix, 16);
     this.#handle.use((raw) => raw.transform(entries));
+    this.#frame = {};
   }
 
   /**
@@ -749,17 +764,19 @@ export class Mesh {
    * the header of ply, of obj and of vtp, `extras.warnings` of a glb's `asset`, and their codes, as far as there is room,
    * in the header of stl. mz3 has no room for them. Without any, the bytes are the same as ever.
    *
-   * With `space`, a file says which way its axes point, as 3D Slicer reads it: `SPACE=RAS` or `SPACE=LPS` in the header
-   * of stl, a comment of ply and obj, the field data of vtp. Slicer takes files that do not say it for LPS, and so turns
-   * a surface in RAS by 180° about z. mz3 has no room for it; NiiVue takes it for RAS, which `as` gives.
+   * A file says which way its axes point, if the {@link Mesh.space} is known or `space` is given, as 3D Slicer reads it:
+   * `SPACE=RAS` or `SPACE=LPS` in the header of stl, a comment of ply and obj, the field data of vtp. Slicer takes files
+   * that do not say it for LPS, and so turns a surface in RAS by 180° about z. mz3 has no room for it; NiiVue takes it
+   * for RAS, which `as` gives.
    *
-   * With `space` or `unit`, a glb is as glTF wants it: in metres, y upwards, z to the front. One root node maps to that
-   * what is beneath it in the units and space of the mesh, and says in its `extras` from what, so that
-   * {@link Mesh.parse} gives back positions as they were. Without `unit`, lengths are not scaled; without `space`, axes
+   * With a known or given space or unit, a glb is as glTF wants it: in metres, y upwards, z to the front. One root node
+   * maps to that what is beneath it in the units and space of the mesh, and says in its `extras` from what, so that
+   * {@link Mesh.parse} gives back positions as they were. Without a unit, lengths are not scaled; without a space, axes
    * are kept; without both, there is no such node.
    *
    * @param options - `recentre`: write positions relative to the origin of the mesh, which moves it there. Default false.
-   *   `warnings`: further ones to write. `space`, `as` and `unit`: what to state, {@link SpaceOptions}; default nothing.
+   *   `warnings`: further ones to write. `space`, `as` and `unit`: what to state, {@link SpaceOptions}; default what is
+   *   known.
    * @throws {@link VesicleError} `invalid-argument`: no such format, space or unit; `precision` for stl and mz3, as
    *   {@link Mesh.arrays}, unless it is recentred.
    */
@@ -771,7 +788,7 @@ export class Mesh {
     const known = ['recentre', 'warnings', ...SPACE_OPTIONS];
     const { recentre = false, warnings, ...given } = checkProperties('options', options, known);
     boolean('recentre', recentre);
-    const frame = checkedSpaceOptions(given);
+    const frame = checkedSpaceOptions(given, this.#frame);
     const moved = recentre ? recentred(this.origin) : [];
     const notes = notesOf(mergedWarnings(moved, this.#warnings(), checkedWarnings('warnings', warnings)));
     return this.#handle.use((raw) => raw.toBytes(format, recentre, notes, ...frame));
@@ -817,7 +834,7 @@ function edgeBounds(edge: { min: number; max: number }): [number, number] {
 }
 
 /** Properties of a mesh besides its triangles. */
-type Facts = Frame & Pick<MeshExtra, 'warnings'>;
+type Facts = MeshFrame & Pick<MeshExtra, 'warnings'>;
 
 function made(make: () => RawMesh, { space, unit, warnings = [] }: Facts = {}): Mesh {
   const frame = { ...(space && { space }), ...(unit && { unit }) };

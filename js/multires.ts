@@ -1,6 +1,7 @@
 import { checkProperties, denseCopy, integer, invalid, shallowCopy, typedArray, vec3 } from './check.js';
 import type { Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
+import { frameOf, type MeshFrame } from './mesh-file.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawMultires, TriangleCopy } from './vesicle.js';
@@ -104,6 +105,7 @@ export class MultiresolutionModel implements Stepper {
   readonly #meshes: Mesh[];
   readonly #runner = new Runner();
   readonly #warnings: ModelWarnings;
+  readonly #frame: MeshFrame;
 
   /**
    * Creates a model whose surface is the base with the detail.
@@ -124,7 +126,8 @@ export class MultiresolutionModel implements Stepper {
     });
     this.#meshHandles = [0, 1, 2].map((which) => new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh(which))));
     this.#warnings = new ModelWarnings(known.detail?.warnings, known.base?.warnings);
-    this.#meshes = this.#meshHandles.map((handle) => wrapMesh(handle, true, () => this.#warnings.of()));
+    this.#frame = frameOf(known.detail ?? known.base);
+    this.#meshes = this.#meshHandles.map((handle) => wrapMesh(handle, true, () => this.#warnings.of(), this.#frame));
   }
 
   /**
@@ -258,7 +261,7 @@ export class MultiresolutionModel implements Stepper {
   levelMeshes(): Mesh[] {
     const levels = this.#handle.use((raw) => raw.levelMeshes());
     const warnings = this.#warnings.of();
-    return levels.map((level) => wrapMesh(new Handle('Mesh', () => level), false, () => warnings));
+    return levels.map((level) => wrapMesh(new Handle('Mesh', () => level), false, () => warnings, this.#frame));
   }
 
   /**

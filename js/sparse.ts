@@ -1,6 +1,6 @@
 // Volumes of which only parts are in memory, as the models see them.
 import { endingTogether } from './abort.js';
-import type { DataOptions, Vec3, VoxelArray } from './data.js';
+import type { DataOptions, LengthUnit, Vec3, VoxelArray } from './data.js';
 import type { Handle } from './runtime.js';
 import type { RawSparseVolume } from './vesicle.js';
 import type { Warning } from './warning.js';
@@ -33,6 +33,8 @@ export interface SparseSource {
   coarsest: VoxelArray;
   /** Intensity of voxels that are not stored. */
   fill: number;
+  /** Length of a world unit, if it is known. */
+  unit: LengthUnit | undefined;
   /** Warnings about assumptions on the volume. */
   warnings: readonly Warning[];
   /** Creates the WebAssembly object that holds the voxels of one model, with the coarsest level, which is freed with it. */

@@ -1,7 +1,7 @@
 import { checkProperties, integer, invalid, shallowCopy, typedArray, vec3 } from './check.js';
 import type { SpaceOptions, Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
-import { checkedSpaceOptions, SPACE_OPTIONS } from './mesh-file.js';
+import { checkedSpaceOptions, frameOf, type MeshFrame, SPACE_OPTIONS } from './mesh-file.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
 import { RawTracker, TriangleCopy } from './vesicle.js';
@@ -139,6 +139,7 @@ export class SurfaceTracker implements Stepper {
   readonly #mesh: Mesh;
   readonly #runner = new Runner();
   readonly #warnings: ModelWarnings;
+  readonly #frame: MeshFrame;
   readonly #frameSeconds: number;
 
   /**
@@ -163,7 +164,8 @@ export class SurfaceTracker implements Stepper {
     );
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     this.#warnings = new ModelWarnings(known.volume.warnings, known.start?.warnings);
-    this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of({ frame: this.frame }));
+    this.#frame = frameOf(known.volume);
+    this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of({ frame: this.frame }), this.#frame);
   }
 
   /**
@@ -298,6 +300,7 @@ export class SurfaceTracker implements Stepper {
       new Handle('Mesh', () => this.#handle.use((raw) => raw.meshAt(frame) as import('./vesicle.js').RawMesh)),
       false,
       () => warnings,
+      this.#frame,
     );
   }
 
@@ -314,7 +317,7 @@ export class SurfaceTracker implements Stepper {
    * @throws {@link VesicleError} `invalid-argument` if no frame tracked so far has a surface; `too-large`.
    */
   toGlb(options?: SpaceOptions): Uint8Array {
-    const frame = checkedSpaceOptions(checkProperties('options', options, SPACE_OPTIONS));
+    const frame = checkedSpaceOptions(checkProperties('options', options, SPACE_OPTIONS), this.#frame);
     const seconds = Math.min(Math.max(this.#frameSeconds, 0.001), 1000);
     return this.#handle.use((raw) => raw.toGlb(seconds, notesOf(this.#warnings.of()), ...frame));
   }

@@ -143,6 +143,7 @@ export class ZarrVolume {
     if (!range) throw invalid('volume', 'the coarsest level must have a finite voxel');
     return {
       ...{ levels: this.#levels.map(({ info }) => info), type: finest.info.voxelType, fill: finest.fill },
+      unit: this.unit,
       warnings: this.warnings,
       ...{ range, coarsest, concurrency: this.#concurrency, create: () => sparseVolume(this[SPARSE_SOURCE]()) },
       read: async ({ level, min, dims }, signal) => {

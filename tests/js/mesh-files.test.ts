@@ -3,7 +3,20 @@ import { Box3, Vector3 } from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { beforeAll, expect, test } from 'vitest';
 import startReaders, { parseMesh } from '../../pkg/import/index.js';
-import { animationGlb, Mesh, type MeshFormat, parsePoints, type Space, type SpaceOptions } from '../../pkg/index.js';
+import {
+  animationGlb,
+  DeformableModel,
+  LabelSurfaces,
+  Mesh,
+  type MeshFormat,
+  MultiresolutionModel,
+  parsePoints,
+  type Space,
+  type SpaceOptions,
+  SurfaceTracker,
+  type Vec3,
+  Volume,
+} from '../../pkg/index.js';
 import { failure, wrong } from './helpers.js';
 
 beforeAll(async () => {
@@ -97,6 +110,58 @@ test('a head is 0.2 m high in three.js, its nose towards z', async () => {
   }
   const plain = await seen(head().toBytes('glb'));
   expect(rounded(plain.getSize(new Vector3()), 1)).toEqual(size.map(Math.round));
+});
+
+test('meshes of volumes state the space and unit of the volume', async () => {
+  const data = new Float32Array(1000).map(
+    (_, at) => 4 - Math.hypot((at % 10) - 4, (Math.floor(at / 10) % 10) - 4, Math.floor(at / 100) - 5),
+  );
+  const grid = { dims: [10, 10, 10] as Vec3, affine: [20, 0, 0, 0, 0, 20, 0, 0, 0, 0, 20, 0, 0, 0, 0, 1] };
+  const volume = new Volume({ ...grid, data, space: 'LPS', unit: 'mm' });
+  const labels = new Volume({
+    ...grid,
+    data: new Uint8Array(data.map((x) => Number(x > 0))),
+    space: 'LPS',
+    unit: 'mm',
+  });
+  const frames = { affine: grid.affine, space: 'LPS' as Space, unit: 'mm' as const };
+  const model = new DeformableModel({ volume });
+  const surfaces = new LabelSurfaces({ volume: labels });
+  const tracker = new SurfaceTracker({
+    volume: new Volume({ ...frames, dims: [10, 10, 10, 2], data: Float32Array.of(...data, ...data) }),
+  });
+  const meshes = [Mesh.marchingCubes(volume, 1), model.mesh, surfaces.mesh(1), tracker.mesh];
+  for (const mesh of meshes) expect([mesh.space, mesh.unit]).toEqual(['LPS', 'mm']);
+  tracker.step(3);
+  expect(tracker.meshAt(0).space).toBe('LPS');
+  expect(Mesh.parse(tracker.toGlb()).unit).toBe('mm');
+
+  const mesh = meshes[0] as Mesh;
+  const axes: Vec3[] = [
+    [50, 0, 0],
+    [0, 50, 0],
+    [0, 0, 50],
+  ];
+  const ball = { center: [80, 80, 100] as Vec3, axes: axes as [Vec3, Vec3, Vec3] };
+  const sculpted = new MultiresolutionModel({ detail: mesh, ellipsoids: [ball] });
+  expect([sculpted.mesh.space, sculpted.levelMeshes()[0]?.unit]).toEqual(['LPS', 'mm']);
+  for (const format of ['stl', 'ply', 'obj'] as const) {
+    expect(text(mesh.toBytes(format))).toContain('SPACE=LPS');
+    expect(text(mesh.toBytes(format, { as: 'RAS' }))).toContain('SPACE=RAS');
+    expect(text(mesh.toBytes(format, { space: null }))).not.toContain('SPACE');
+  }
+  const { bounds } = mesh.info();
+  const height = (bounds.max[2] as number) - (bounds.min[2] as number);
+  const size = async (glb: Uint8Array) => (await seen(glb)).getSize(new Vector3()).y;
+  expect(await size(mesh.toBytes('glb'))).toBeCloseTo(height / 1000, 5);
+  expect(await size(animationGlb([mesh]))).toBeCloseTo(height / 1000, 5);
+  expect(await size(mesh.toBytes('glb', { space: null, unit: null }))).toBeCloseTo(height, 2);
+  expect(text(Mesh.parse(mesh.toBytes('glb')).toBytes('ply'))).toContain('SPACE=LPS');
+
+  const copy = mesh.clone();
+  copy.transform([0.001, 0, 0, 0, 0, 0.001, 0, 0, 0, 0, 0.001, 0, 0, 0, 0, 1]);
+  expect([copy.space, copy.unit]).toEqual([undefined, undefined]);
+  expect(text(copy.toBytes('ply'))).not.toContain('SPACE');
 });
 
 test('options that say nothing are refused', () => {
