@@ -32,7 +32,7 @@ export function animationGlb(
   const meshes = denseCopy('frames', frames);
   if (meshes.length === 0) throw invalid('frames', 'must contain at least one Mesh');
   const handles = meshes.map((frame, at) => meshHandle(`frames[${at}]`, frame));
-  const frame = checkedSpaceOptions(given, frameOf(meshes[0]));
+  const frame = checkedSpaceOptions(given, frameOf(meshes[0]), true);
   const notes = notesOf(mergedWarnings(...meshes.map(({ warnings }) => warnings)));
   const animation = call(() => new RawAnimation(notes, ...frame));
   try {

@@ -46,8 +46,9 @@ export interface VolumeFileOptions {
    */
   files?: readonly NamedFile[];
   /**
-   * Orientation of the world axes for files that do not tell it: some NRRD, which are otherwise LPS with a warning, Analyze
-   * 7.5, and NIfTI without a transform (`qform_code` and `sform_code` are 0), otherwise RAS.
+   * Orientation of the world axes for files that do not tell it: some NRRD, which are otherwise LPS with a warning, or RAS
+   * without one if they have spacings alone; Analyze 7.5, and NIfTI without a transform (`qform_code` and `sform_code` are
+   * 0), otherwise RAS.
    */
   space?: Space;
 }

@@ -21,11 +21,19 @@ export function frameOf(
 /** Names of the {@link SpaceOptions}. */
 export const SPACE_OPTIONS = ['space', 'as', 'unit'] as const;
 
-/** Returns space, space in the file, and unit for the WebAssembly module, empty for none; those of `known` by default. */
-export function checkedSpaceOptions(given: SpaceOptions, known: MeshFrame): [space: string, as: string, unit: string] {
+/**
+ * Returns space, space in the file, and unit for the WebAssembly module, empty for none; those of `known` by default. A glb
+ * is turned by default only if it can be in metres, as glTF wants it: volumes made from numbers alone have a space, too.
+ */
+export function checkedSpaceOptions(
+  given: SpaceOptions,
+  known: MeshFrame,
+  isGlb: boolean,
+): [space: string, as: string, unit: string] {
   const { as } = given;
-  const space = given.space === null ? undefined : (given.space ?? known.space);
   const unit = given.unit === null ? undefined : (given.unit ?? known.unit);
+  const isKept = isGlb && unit === undefined && as === undefined;
+  const space = given.space === null ? undefined : (given.space ?? (isKept ? undefined : known.space));
   checkStated({ ...(space && { space }), ...(unit && { unit }) });
   if (as === undefined) return [space ?? '', '', unit ?? ''];
   choice('as', as, SPACES);

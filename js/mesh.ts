@@ -769,10 +769,10 @@ export class Mesh {
    * that do not say it for LPS, and so turns a surface in RAS by 180° about z. mz3 has no room for it; NiiVue takes it
    * for RAS, which `as` gives.
    *
-   * With a known or given space or unit, a glb is as glTF wants it: in metres, y upwards, z to the front. One root node
-   * maps to that what is beneath it in the units and space of the mesh, and says in its `extras` from what, so that
-   * {@link Mesh.parse} gives back positions as they were. Without a unit, lengths are not scaled; without a space, axes
-   * are kept; without both, there is no such node.
+   * If the {@link Mesh.unit} is known, or `unit` or `space` is given, a glb is as glTF wants it: in metres, y upwards, z to
+   * the front. One root node maps to that what is beneath it in the units and space of the mesh, and says in its `extras`
+   * from what, so that {@link Mesh.parse} gives back positions as they were. Without a unit, lengths are not scaled;
+   * without a space, axes are kept. Else there is no such node, and a glb has positions as they are.
    *
    * @param options - `recentre`: write positions relative to the origin of the mesh, which moves it there. Default false.
    *   `warnings`: further ones to write. `space`, `as` and `unit`: what to state, {@link SpaceOptions}; default what is
@@ -788,7 +788,7 @@ export class Mesh {
     const known = ['recentre', 'warnings', ...SPACE_OPTIONS];
     const { recentre = false, warnings, ...given } = checkProperties('options', options, known);
     boolean('recentre', recentre);
-    const frame = checkedSpaceOptions(given, this.#frame);
+    const frame = checkedSpaceOptions(given, this.#frame, format === 'glb');
     const moved = recentre ? recentred(this.origin) : [];
     const notes = notesOf(mergedWarnings(moved, this.#warnings(), checkedWarnings('warnings', warnings)));
     return this.#handle.use((raw) => raw.toBytes(format, recentre, notes, ...frame));

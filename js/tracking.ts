@@ -317,7 +317,7 @@ export class SurfaceTracker implements Stepper {
    * @throws {@link VesicleError} `invalid-argument` if no frame tracked so far has a surface; `too-large`.
    */
   toGlb(options?: SpaceOptions): Uint8Array {
-    const frame = checkedSpaceOptions(checkProperties('options', options, SPACE_OPTIONS), this.#frame);
+    const frame = checkedSpaceOptions(checkProperties('options', options, SPACE_OPTIONS), this.#frame, true);
     const seconds = Math.min(Math.max(this.#frameSeconds, 0.001), 1000);
     return this.#handle.use((raw) => raw.toGlb(seconds, notesOf(this.#warnings.of()), ...frame));
   }

@@ -150,6 +150,11 @@ test('meshes of volumes state the space and unit of the volume', async () => {
     expect(text(mesh.toBytes(format, { as: 'RAS' }))).toContain('SPACE=RAS');
     expect(text(mesh.toBytes(format, { space: null }))).not.toContain('SPACE');
   }
+  const numbers = Mesh.marchingCubes(new Volume({ ...grid, data }), 1);
+  expect([numbers.space, numbers.unit]).toEqual(['RAS', undefined]);
+  expect(numbers.toBytes('glb')).toEqual(numbers.toBytes('glb', { space: null }));
+  expect(text(numbers.toBytes('stl'))).toContain('SPACE=RAS');
+
   const { bounds } = mesh.info();
   const height = (bounds.max[2] as number) - (bounds.min[2] as number);
   const size = async (glb: Uint8Array) => (await seen(glb)).getSize(new Vector3()).y;

@@ -103,7 +103,7 @@ test('files of a mesh have its warnings and those given, and are read as without
   );
   expect(text(bytes('obj'))).toContain('# warning anisotropic: ');
   expect(text(bytes('vtp'))).toContain('<!-- warning anisotropic: ');
-  expect(text(bytes('stl').subarray(0, 80))).toMatch(/^binary STL, warnings: anisotropic reader +$/);
+  expect(text(bytes('stl').subarray(0, 80))).toMatch(/^binary STL, SPACE=RAS, warnings: anisotropic reader +$/);
   const glb = new TextDecoder().decode(bytes('glb'));
   expect(glb).toContain('"extras":{"warnings":["anisotropic: Voxels of 1×1×6 mm.","reader: A voxel is wrong.');
   expect(animationGlb([surface, surface]).length).toBeGreaterThan(animationGlb([plain, plain]).length);
@@ -118,7 +118,7 @@ test('what has no warnings is as ever', async () => {
   const model = new DeformableModel({ volume: none, params: { iso: 100 } });
   expect([none.warnings, model.step(5).warnings, model.mesh.warnings]).toEqual([[], [], []]);
   expect('warnings' in parseVolume(none.toNifti())).toBe(false);
-  expect(text(model.mesh.toBytes('ply'))).not.toContain('comment');
+  expect(text(model.mesh.toBytes('ply')).match(/comment.*/g)).toEqual(['comment SPACE=RAS']);
 });
 
 test('they come out of a worker', async () => {
