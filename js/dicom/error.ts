@@ -1,9 +1,14 @@
-// Errors of DICOM files.
+// Errors of DICOM files, and lists in messages.
 import { VesicleError } from '../error.js';
 
 /** Returns the `bad-file` error whose message names the part of the data and its problem; the caller throws it. */
 export function badDicom(part: string, problem: string): VesicleError {
   return new VesicleError('bad-file', `DICOM: ${part}: ${problem}`);
+}
+
+/** Returns the first three of a list, and how many more there are. */
+export function listed(items: readonly string[]): string {
+  return items.slice(0, 3).join(', ') + (items.length > 3 ? ` and ${items.length - 3} more` : '');
 }
 
 /** Returns what an error of another library says. */

@@ -5,6 +5,7 @@
  * another. A tilted gantry moves each slice sideways: the volume is sheared, and its axes are not perpendicular.
  */
 import type { Vec3 } from '../data.js';
+import { listed } from './error.js';
 import type { Frame } from './types.js';
 
 /** Part of the distance between slices by which a slice may be off without notice: less than interpolation shows. */
@@ -35,6 +36,14 @@ const mix = (a: Vec3, b: Vec3, t: number): Vec3 => [
   a[1] + t * (b[1] - a[1]),
   a[2] + t * (b[2] - a[2]),
 ];
+
+/** Returns the largest of numbers, at least 0; there may be more than a call has room for as arguments. */
+export function largest(numbers: Iterable<number>): number {
+  let most = 0;
+  for (const number of numbers) most = Math.max(most, number);
+  return most;
+}
+
 const shown = (length: number) => `${Number(length.toPrecision(4))} mm`;
 
 /** Returns the distances of sorted slices from the first one, along the normal. */
@@ -51,8 +60,8 @@ export function evennessOf(slices: readonly Frame[]): Evenness {
   if (!first || !last || slices.length < 3) return { kind: 'even' };
   const distances = distancesOf(slices);
   const extent = distances.at(-1) ?? 0;
-  const sideways = Math.max(
-    ...slices.map(({ position }, k) => besideLine(position, first, last, (distances[k] ?? 0) / extent)),
+  const sideways = largest(
+    slices.map(({ position }, k) => besideLine(position, first, last, (distances[k] ?? 0) / extent)),
   );
   if (sideways > SIDEWAYS * Math.min(...first.spacing))
     return {
@@ -60,7 +69,7 @@ export function evennessOf(slices: readonly Frame[]): Evenness {
       reason: `slices are shifted sideways by up to ${shown(sideways)} from the line through the first and last`,
     };
   const step = extent / (slices.length - 1);
-  const off = Math.max(...distances.map((distance, k) => Math.abs(distance - k * step)));
+  const off = largest(distances.map((distance, k) => Math.abs(distance - k * step)));
   if (off > EVEN * step) return uneven(distances);
   if (off <= UNNOTICED * step) return { kind: 'even' };
   return {
@@ -104,8 +113,7 @@ function missingAt(numbers: number[], count: number): string {
     return number - before > 1 ? [`${before + 1} and ${number + 1}`] : [];
   });
   const missing = count - numbers.length;
-  const listed = gaps.slice(0, 3).join(', ') + (gaps.length > 3 ? ` and ${gaps.length - 3} more` : '');
-  return `${missing} of ${count} slices ${missing === 1 ? 'is' : 'are'} missing: between ${listed}`;
+  return `${missing} of ${count} slices ${missing === 1 ? 'is' : 'are'} missing: between ${listed(gaps)}`;
 }
 
 /**

@@ -11,7 +11,7 @@
  * 4. Images at the same position without any such difference are not read, since the right one is unknown.
  */
 import type { Vec3 } from '../data.js';
-import { cross, dot, evennessOf } from './geometry.js';
+import { cross, dot, evennessOf, largest } from './geometry.js';
 import type { Frame } from './types.js';
 
 /** Largest difference of directions of images that count as parallel: those in files are rounded, to three digits and more. */
@@ -45,11 +45,11 @@ export interface Stack {
   label: string;
   /** Warnings about the volume. */
   notes: string[];
-  /** Facts about the volume that are no reason to doubt it. */
+  /** Facts about the volume that do not affect its voxels. */
   remarks?: string[];
 }
 
-/** Images that cannot be put together, and why. */
+/** Images that do not form a volume, and why. */
 export interface Conflict {
   images: Frame[];
   reason: string;
@@ -134,7 +134,7 @@ function separated(images: Frame[], label: string): (Stack | Conflict)[] {
   const slots = slotsOf(images);
   const most = largestSlot(slots);
   if (most > 1) {
-    const parts = byKind(images, most) ?? undefined;
+    const parts = byKind(images, most);
     if (parts) return parts.flatMap(([name, part]) => separated(part, joined(label, name)));
     const timed = inTime(images, slots, most, label);
     return (
@@ -171,7 +171,7 @@ function slotsOf(images: readonly Frame[]): number[] {
 function largestSlot(slots: readonly number[]): number {
   const counts = new Map<number, number>();
   for (const slot of slots) counts.set(slot, (counts.get(slot) ?? 0) + 1);
-  return Math.max(0, ...counts.values());
+  return largest(counts.values());
 }
 
 /** Returns the value of an attribute, rounded, if it is a number; of a file with one image alone, none that is its own. */
@@ -236,7 +236,7 @@ function byKind(images: readonly Frame[], most: number): [string, Frame[]][] | u
 
 /** Returns the volume whose frames are the images at one position, or volumes if some frames lack slices. */
 function inTime(images: Frame[], slots: number[], most: number, label: string): Stack[] | undefined {
-  const places = Math.max(...slots) + 1;
+  const places = largest(slots) + 1;
   for (const mark of PHASES) {
     const groups = byMark(images, mark);
     if (groups.length !== most || !groups.every(([, group]) => largestSlot(slotsOf(group)) === 1)) continue;

@@ -3,7 +3,7 @@ import type { DataSet } from 'dicom-parser';
 import type { Vec3 } from '../data.js';
 import { numberOf, numbersOf, textOf } from './elements.js';
 import { cross, dot } from './geometry.js';
-import { FLOAT_PIXELS, type Header, PIXEL_DATA } from './parser.js';
+import { FLOAT_PIXELS, type Header, pixelsOf } from './parser.js';
 import { segmentsOf, wholeFractionOf } from './segments.js';
 import type { Source } from './source.js';
 import type { Frame, PixelFormat, Series, Skipped } from './types.js';
@@ -72,7 +72,7 @@ export function framesIn(file: Source, header: Header): Frame[] | Skipped {
 function frames(file: Source, header: Header): Frame[] {
   const { data, deflated } = header;
   if (data.elements.x00041220) throw new Unusable('an index of files (DICOMDIR)');
-  const pixels = [PIXEL_DATA, ...FLOAT_PIXELS].map((tag) => data.elements[tag]).find(Boolean);
+  const pixels = pixelsOf(data);
   if (!pixels) throw new Unusable('no image');
   if (/\bMOSAIC\b/.test(textOf(data, 'x00080008')))
     throw new Unusable('a mosaic of slices in one image, which is not taken apart');
@@ -210,8 +210,8 @@ function formatOf({ data, transferSyntax }: Header, representation: string | und
   };
 }
 
-/** Transfer syntaxes of compression that loses something: JPEG, and the JPEG-LS, JPEG 2000 and HTJ2K that may. */
-const LOSSY = /^1\.2\.840\.10008\.1\.2\.4\.(5[01])$/;
+/** Transfer syntaxes of JPEG, which loses something; decoders of others tell whether they do. */
+const LOSSY = /^1\.2\.840\.10008\.1\.2\.4\.5[01]$/;
 
 function seriesOf(data: DataSet, transferSyntax: string): Series {
   const padding = data.uint16('x00280103') === 1 ? data.int16('x00280120') : data.uint16('x00280120');

@@ -19,7 +19,7 @@ import { VesicleError } from '../error.js';
 import type { InputFiles } from '../input-file.js';
 import { withPause } from '../pause.js';
 import { checkListener, checkSignal } from '../stepper.js';
-import { badDicom } from './error.js';
+import { badDicom, listed } from './error.js';
 import { evennessOf } from './geometry.js';
 import { type Conflict, grouped, isNearlyParallel, type Stack, stacksOf } from './grouping.js';
 import { framesIn } from './header.js';
@@ -167,10 +167,7 @@ function beside(
     (isLocaliser ? remarks : notes).push(text);
   }
   const files = damaged.filter((one) => one.damaged || one.series === first.series.uid).map(({ name }) => name);
-  if (files.length > 0)
-    notes.push(
-      `${files.slice(0, 3).join(', ')}${files.length > 3 ? ` and ${files.length - 3} more` : ''} could not be read, and may be missing in the volume.`,
-    );
+  if (files.length > 0) notes.push(`${listed(files)} could not be read, and may be missing in the volume.`);
   if (stacks.some((other) => other !== stack && isPartOf(other, first)))
     notes.push(
       'Other images of the series differ in size, spacing, type of voxels or slightly in orientation: they are a volume of their own.',

@@ -1,5 +1,5 @@
 // The data sets of DICOM files, by dicom-parser.
-import type { DataSet } from 'dicom-parser';
+import type { DataSet, Element } from 'dicom-parser';
 import { invalid } from '../check.js';
 import { badDicom, reasonOf } from './error.js';
 import type { Source } from './source.js';
@@ -15,9 +15,14 @@ export async function importParser(): Promise<Parser> {
   throw invalid('dicom-parser', 'this package, 1.8 or newer, is needed to read DICOM: npm install dicom-parser');
 }
 
-export const PIXEL_DATA = 'x7fe00010';
+const PIXEL_DATA = 'x7fe00010';
 /** Float and Double Float Pixel Data (PS3.3, C.7.6.24 and C.7.6.25). */
 export const FLOAT_PIXELS = ['x7fe00008', 'x7fe00009'] as const;
+
+/** Returns the element with the voxels of a data set, of whichever type; undefined if there is none. */
+export function pixelsOf(data: DataSet): Element | undefined {
+  return [PIXEL_DATA, ...FLOAT_PIXELS].map((tag) => data.elements[tag]).find(Boolean);
+}
 
 /** Explicit little-endian, implicit little-endian, and explicit little-endian compressed as a whole (PS3.5, annex A). */
 export const EXPLICIT = '1.2.840.10008.1.2.1';
@@ -78,7 +83,7 @@ async function parsedHead(
 ): Promise<Header | undefined> {
   try {
     const header = await parse(parser, file, bytes, { untilTag: PIXEL_DATA });
-    const found = [PIXEL_DATA, ...FLOAT_PIXELS].some((tag) => header.data.elements[tag] !== undefined);
+    const found = pixelsOf(header.data) !== undefined;
     return found || whole || header.deflated ? header : undefined;
   } catch (error) {
     if (whole) throw badDicom(file.name, `could not be read: ${reasonOf(error)}`);

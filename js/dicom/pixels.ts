@@ -3,7 +3,7 @@ import type { DataSet, Element } from 'dicom-parser';
 import type { VoxelArray } from '../data.js';
 import { type Decode, type Decoded, type Decoders, decoderOf } from './codecs.js';
 import { badDicom, reasonOf } from './error.js';
-import { FLOAT_PIXELS, type Parser, PIXEL_DATA, readWhole } from './parser.js';
+import { type Parser, pixelsOf, readWhole } from './parser.js';
 import { decodeRle } from './rle.js';
 import type { Source } from './source.js';
 import type { Frame, PixelFormat } from './types.js';
@@ -90,7 +90,7 @@ export class PixelReader {
   /** Returns the bytes of a compressed image: those of all its fragments. */
   async #compressed({ file, index, count }: Frame): Promise<Uint8Array> {
     const data = await this.#whole(file);
-    const element = [PIXEL_DATA, ...FLOAT_PIXELS].map((tag) => data.elements[tag]).find(Boolean);
+    const element = pixelsOf(data);
     const fragments = element?.fragments ?? [];
     if (!element || fragments.length === 0) throw badDicom(file.name, 'pixel data: no compressed image is there');
     try {

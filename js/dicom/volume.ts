@@ -6,7 +6,7 @@ import { withPause } from '../pause.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import type { Warning } from '../warning.js';
 import type { Decoders } from './codecs.js';
-import { badDicom } from './error.js';
+import { badDicom, listed } from './error.js';
 import { affineOf, distancesOf, evennessOf } from './geometry.js';
 import type { Stack } from './grouping.js';
 import type { Parser } from './parser.js';
@@ -169,7 +169,7 @@ export class ImageVolume extends DicomVolume {
     const affine = affineOf(slices, count);
     const { seconds, note } = secondsOf(frames);
     const off = evenness.kind === 'even' && evenness.note ? [evenness.note] : [];
-    const texts = [...notes, ...off, ...(note ? [note] : []), ...doubtsOn(first)];
+    const texts = [...notes, ...off, ...(note ? [note] : []), ...generalWarnings(first)];
     super(first.series, label, {
       dims: [first.format.columns, first.format.rows, count],
       spacing: spacingOf(affine),
@@ -227,7 +227,7 @@ const withWarnings = (warnings: Warning[]) => (warnings.length > 0 ? { warnings 
 /** Returns warnings about compressed images, which are known once they are read. */
 function foundIn({ lossy, endless }: PixelReader, series: Series): Warning[] {
   const files = [...endless];
-  const text = `${files.slice(0, 3).join(', ')}${files.length > 3 ? ` and ${files.length - 3} more` : ''} may be cut off or damaged: the compressed image has no end.`;
+  const text = `${listed(files)} may be cut off or damaged: the compressed image has no end.`;
   return [...(lossy.size > 0 && !series.lossy ? [reader(LOSSY)] : []), ...(files.length > 0 ? [reader(text)] : [])];
 }
 
@@ -239,8 +239,8 @@ function interpolated(uneven: string | undefined): Warning[] {
 
 const LOSSY = 'The images were compressed with loss: intensities differ from those that were measured.';
 
-/** Returns reasons to doubt intensities or positions that concern all images. */
-function doubtsOn({ series, isChained, slope }: Frame): string[] {
+/** Returns warnings about the intensities or positions of all images. */
+function generalWarnings({ series, isChained, slope }: Frame): string[] {
   return [
     ...(slope === 0 ? ['The slope of intensities is 0, which cannot be: values are as stored.'] : []),
     ...(series.lossy ? [LOSSY] : []),

@@ -32,8 +32,8 @@ export function pageBytes(format: Format): number {
 }
 
 /**
- * Returns the blocks of a page with the samples from `sample` on; of `part` > 0 those of an image of the same format
- * that follows so many images later without a directory of its own.
+ * Returns the blocks of a page with the samples from `sample` on. With `part` > 0 they are those of the image that comes
+ * `part` images after it in the same format, without a directory of its own.
  */
 export async function blocksOf(page: Page, format: Format, sample: number, part: number): Promise<Block[]> {
   const stored = await storedBlocks(page, format, sample);

@@ -37,7 +37,7 @@ export interface Layout {
   frameSeconds?: number | undefined;
   calibration?: { slope: number; intercept: number } | undefined;
   warnings: string[];
-  /** Facts that are no reason to doubt the voxels. */
+  /** Facts that do not affect the voxels. */
   remarks?: string[];
 }
 

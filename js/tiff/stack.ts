@@ -62,7 +62,7 @@ export class TiffStack {
   readonly frameSeconds: number | undefined;
   /** Findings of the reader: assumptions that it made, and parts that it leaves out. */
   readonly warnings: readonly Warning[];
-  /** Facts that are no reason to doubt the voxels, such as channels in files that were not opened. */
+  /** Facts that do not affect the voxels, such as channels in files that were not opened. */
   readonly remarks: readonly string[];
   readonly #layout: Layout;
   readonly #sources: Source[];

@@ -16,6 +16,14 @@ pub(super) struct Colours {
     pub(super) run: usize,
 }
 
+/// Returns voxels by the numbers of a file: the luminance of colours, or the numbers themselves.
+pub(super) fn luminance_of(colours: Option<Colours>, numbers: Voxels) -> Voxels {
+    match colours {
+        Some(colours) => colours.luminance(numbers),
+        None => numbers,
+    }
+}
+
 impl Colours {
     /// Returns the colours of voxels whose numbers are side by side.
     pub(super) fn interleaved(channels: usize) -> Self {

@@ -7,9 +7,9 @@
 //! (`ElementDataFile = LIST`), or a numbered series. Of colours (three or four channels of bytes) the luminance is read.
 
 use super::beside::{DataFiles, Series, pattern_and_numbers};
-use super::colour::Colours;
+use super::colour::{Colours, luminance_of};
 use super::gzip::{gunzip, is_gzip, unzlib};
-use super::raw::{FieldName, MAX_PADDING, Scalar, decode, decode_text, payload, payload_size, volume_error};
+use super::raw::{FieldName, MAX_PADDING, Scalar, decode, decode_text, payload, payload_size, volume_of};
 use super::source::Source;
 use super::text::{Field, Lines};
 use super::units::{metres, thickness_warning, unit_of};
@@ -223,20 +223,16 @@ impl Header {
     /// Returns the volume that the header describes, with its voxels read from `source`.
     fn volume(&self, source: &Source<'_>) -> Result<Volume, FormatError> {
         let numbers = self.numbers(source)?;
-        let volume = Volume::new(VolumeInit {
-            voxels: match self.colours {
-                Some(colours) => colours.luminance(numbers),
-                None => numbers,
-            },
+        let init = VolumeInit {
+            voxels: luminance_of(self.colours, numbers),
             dims: self.dims,
             affine: self.affine,
             slope: self.slope,
             intercept: self.intercept,
             frame_seconds: 0.0,
             space: Space::Lps,
-        });
-        let volume = volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit);
-        Ok(self.warnings.iter().cloned().fold(volume, Volume::with_warning))
+        };
+        volume_of(FORMAT, init, self.unit, &self.warnings)
     }
 
     /// Reads the numbers of the voxels from `source`.

@@ -1,7 +1,8 @@
 //! Conversion of the numbers in a volume file, binary or text, to voxels, and of voxels to binary numbers.
 
 use super::FormatError;
-use crate::volume::{VolumeError, Voxels};
+use crate::volume::{LengthUnit, Volume, VolumeError, VolumeInit, Voxels};
+use crate::warning::Warning;
 
 /// Number type of the voxels in a volume file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -251,6 +252,17 @@ fn can_represent(scalar: Scalar, v: f64) -> bool {
         Scalar::I64 => within(-(MAX_EXACT as f64), MAX_EXACT as f64),
         Scalar::F32 | Scalar::F64 => true,
     }
+}
+
+/// Returns the volume of a file, with the unit and the warnings of its header.
+pub(super) fn volume_of(
+    format: &'static str,
+    init: VolumeInit,
+    unit: LengthUnit,
+    warnings: &[Warning],
+) -> Result<Volume, FormatError> {
+    let volume = Volume::new(init).map_err(|error| volume_error(format, error))?.with_unit(unit);
+    Ok(warnings.iter().cloned().fold(volume, Volume::with_warning))
 }
 
 /// Converts an error of [`crate::volume::Volume::new`] to an error about the file being read.

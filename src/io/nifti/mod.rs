@@ -13,9 +13,9 @@ mod fields;
 mod world;
 
 use super::beside::with_single;
-use super::colour::Colours;
+use super::colour::{Colours, luminance_of};
 use super::gzip::{gunzip, gunzip_start, is_gzip};
-use super::raw::{FieldName, MAX_PADDING, Scalar, decode, payload, payload_size, volume_error};
+use super::raw::{FieldName, MAX_PADDING, Scalar, decode, payload, payload_size, volume_of};
 use super::{FormatError, VolumeOptions};
 use crate::math::DAffine3;
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit};
@@ -152,20 +152,16 @@ impl Header {
             return Err(FormatError::truncated(FORMAT, "voxel data", needed, source.len()));
         };
         let numbers = decode(DATA, payload(DATA, rest, size)?, self.scalar, self.big)?;
-        let volume = Volume::new(VolumeInit {
-            voxels: match self.colours {
-                Some(colours) => colours.luminance(numbers),
-                None => numbers,
-            },
+        let init = VolumeInit {
+            voxels: luminance_of(self.colours, numbers),
             dims: self.dims,
             affine: self.affine,
             slope: self.slope,
             intercept: self.intercept,
             frame_seconds: self.frame_seconds,
             space: self.space,
-        });
-        let volume = volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit);
-        Ok(self.warnings.iter().cloned().fold(volume, Volume::with_warning))
+        };
+        volume_of(FORMAT, init, self.unit, &self.warnings)
     }
 }
 

@@ -21,9 +21,9 @@ mod world;
 mod writer;
 
 use super::beside::{DataFiles, Series, pattern_and_numbers};
-use super::colour::Colours;
+use super::colour::{Colours, luminance_of};
 use super::gzip::gunzip;
-use super::raw::{FieldName, MAX_PADDING, Scalar, decode, decode_text, payload, payload_size, volume_error};
+use super::raw::{FieldName, MAX_PADDING, Scalar, decode, decode_text, payload, payload_size, volume_of};
 use super::source::Source;
 use super::text::{Field, Lines};
 use super::{FormatError, VolumeOptions};
@@ -158,18 +158,14 @@ impl Header {
     /// Returns the volume that the header describes, with its voxels read from `source`.
     fn volume(&self, source: &Source<'_>) -> Result<Volume, FormatError> {
         let numbers = self.numbers(source)?;
-        let voxels = match self.colours {
-            Some(colours) => colours.luminance(numbers),
-            None => numbers,
-        };
-        let volume = Volume::new(VolumeInit {
+        let voxels = luminance_of(self.colours, numbers);
+        let init = VolumeInit {
             affine: self.affine,
             frame_seconds: self.frame_seconds,
             space: self.space,
             ..VolumeInit::new(deinterleave_frames(voxels, self.run, self.dims[3])?, self.dims)
-        });
-        let volume = volume.map_err(|error| volume_error(FORMAT, error))?.with_unit(self.unit);
-        Ok(self.warnings.iter().cloned().fold(volume, Volume::with_warning))
+        };
+        volume_of(FORMAT, init, self.unit, &self.warnings)
     }
 
     /// Returns the bytes of `source` after the number of lines that the header says to skip (`line skip`).
