@@ -7,8 +7,14 @@ export interface Brick {
   /** Index of the first voxel. */
   min: Vec3;
   dims: Vec3;
-  data: VoxelArray;
+  /** Undefined for a chunk that is not stored, whose voxels have the fill value of the array. */
+  data: VoxelArray | undefined;
 }
+
+/** Number of bytes that are counted for a brick without voxels. */
+const EMPTY = 256;
+
+const bytesOf = ({ data }: Brick): number => data?.byteLength ?? EMPTY;
 
 /** Reason of the abort of a fetch that nobody waits for any more. */
 export class Abandoned extends Error {}
@@ -52,11 +58,11 @@ export class BrickCache {
 
   #keep(key: string, brick: Brick): void {
     this.#held.set(key, brick);
-    this.#bytes += brick.data.byteLength;
-    for (const [oldest, { data }] of this.#held) {
+    this.#bytes += bytesOf(brick);
+    for (const [oldest, last] of this.#held) {
       if (this.#bytes <= this.#limit) break;
       this.#held.delete(oldest);
-      this.#bytes -= data.byteLength;
+      this.#bytes -= bytesOf(last);
     }
   }
 

@@ -2,6 +2,7 @@
 import type { AsyncReadable, RangeQuery } from '@zarrita/storage';
 import { invalid } from '../check.js';
 import { badZarr } from './error.js';
+import { checkLength, type FileOptions } from './requests.js';
 
 /** Returns the file of a path relative to the folder, or undefined if there is none. */
 type FindFile = (path: string) => Promise<Blob | undefined>;
@@ -12,8 +13,14 @@ function fileStore(find: FindFile): AsyncReadable {
     const file = await find(key.slice(1));
     return file && new Uint8Array(await part(file).arrayBuffer());
   };
+  const whole =
+    (key: string, { mostBytes = Infinity }: FileOptions) =>
+    (file: Blob) => {
+      checkLength(key, file.size, mostBytes);
+      return file;
+    };
   return {
-    get: (key) => read(key, (file) => file),
+    get: (key, options = {}) => read(key, whole(key, options)),
     getRange: (key, range) => read(key, (file) => slice(file, range)),
   };
 }

@@ -4,8 +4,10 @@ import { integer, invalid } from '../check.js';
 import type { Vec3, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
 import { Abandoned, type Brick } from './cache.js';
+import { withSlack } from './codecs.js';
 import { badZarr, shown, translated, type Zarrita } from './error.js';
 import type { AxisName, LevelTransform, Multiscale } from './multiscales.js';
+import { type FileOptions, NotStored, Slots } from './requests.js';
 import type { ZarrLevel, ZarrVoxelType } from './types.js';
 
 /** The channel and the time that are read. */
@@ -28,8 +30,8 @@ const TYPES: Record<string, [ZarrVoxelType, VoxelArrays]> = {
 /** Largest number of voxels along an axis. */
 const MOST_VOXELS = 0xffffffff;
 
-/** Largest number of voxels of a chunk, with all channels and times. */
-const LARGEST_CHUNK = 2 ** 27;
+/** Largest number of bytes of a chunk, decoded, with all channels and times, and of all that are decoded at a time. */
+const LARGEST_CHUNK = 2 ** 28;
 
 /**
  * How far apart the fields of view of two levels may be, in voxels of the coarser one: those that fit only in part may
@@ -51,6 +53,9 @@ export class Level {
   readonly #spatial: Vec3;
   /** Index along each axis of the array; along spatial ones, 0. */
   readonly #selected: number[];
+  /** Bytes of a chunk with all channels and times, as zarrita decodes it. */
+  readonly #chunkBytes: number;
+  readonly #decoders: Slots;
 
   /** Validates an array; `bad-file` if it does not fit the metadata, `invalid-argument` for no such channel or time. */
   constructor(
@@ -67,6 +72,8 @@ export class Level {
       const known = Object.keys(TYPES).join(', ');
       throw badZarr(`${this.#part}.data_type`, `must be one of ${known}, got ${shown(array.dtype)}`);
     }
+    this.#chunkBytes = chunkBytes(array, this.#part);
+    this.#decoders = new Slots(Math.max(1, Math.floor(LARGEST_CHUNK / this.#chunkBytes)));
     this.#spatial = spatialAxes(axes);
     this.#selected = axes.map((axis, index) => selected(axis, array.shape[index] as number, selection));
     this.VoxelArrays = type[1];
@@ -100,32 +107,50 @@ export class Level {
     return dims.reduce((count, size, axis) => count * Math.ceil(size / (chunks[axis] as number)), 1);
   }
 
+  /** Size of a voxel, bytes. */
+  get voxelBytes(): number {
+    return new this.VoxelArrays(0).BYTES_PER_ELEMENT;
+  }
+
   /** Size of the voxels of the selected channel and time, bytes. */
   get bytes(): number {
-    return volumeOf(this.info.dims) * new this.VoxelArrays(0).BYTES_PER_ELEMENT;
+    return volumeOf(this.info.dims) * this.voxelBytes;
+  }
+
+  /** Size of all chunks with voxels of the selected channel and time, with those of others, bytes. */
+  get decodedBytes(): number {
+    return this.chunkCount * this.#chunkBytes;
   }
 
   /** Fetches the voxels of a chunk, by its position along x, y and z in the grid of chunks. */
   async fetch(chunk: Vec3, signal: AbortSignal): Promise<Brick> {
     const position = this.#selected.map((index, axis) => Math.floor(index / (this.#array.chunks[axis] as number)));
     for (const [k, axis] of this.#spatial.entries()) if (axis >= 0) position[axis] = chunk[k] as number;
-    const stored = await this.#chunk(position, signal);
     const { dims, chunks } = this.info;
     const min = chunk.map((index, axis) => index * (chunks[axis] as number)) as Vec3;
     const size = chunks.map((most, axis) => Math.min(most, (dims[axis] as number) - (min[axis] as number))) as Vec3;
-    return { min, dims: size, data: this.#voxels(stored, size, `${this.#part}, chunk ${position.join()}`) };
+    const part = `${this.#part}, chunk ${position.join()}`;
+    await this.#decoders.take(signal);
+    try {
+      const stored = await this.#chunk(position, part, signal);
+      return { min, dims: size, data: stored && this.#voxels(stored, size, part) };
+    } finally {
+      this.#decoders.release();
+    }
   }
 
-  async #chunk(position: number[], signal: AbortSignal): Promise<Stored> {
-    const part = `${this.#part}, chunk ${position.join()}`;
+  /** Returns a chunk; undefined if it is not stored. */
+  async #chunk(position: number[], part: string, signal: AbortSignal): Promise<Stored | undefined> {
+    const options: FileOptions = { signal, mostBytes: withSlack(this.#chunkBytes), mustExist: true };
     for (;;) {
       try {
-        const chunk = (await this.#array.getChunk(position, { signal })) as unknown as Stored;
+        const chunk = (await this.#array.getChunk(position, options)) as unknown as Stored;
         const wanted = this.#array.chunks.reduce((product, size) => product * size, 1);
         if (chunk.data.length === wanted) return chunk;
         throw badZarr(part, `must have ${wanted} voxels, got ${chunk.data.length}`);
       } catch (error) {
         signal.throwIfAborted();
+        if (error instanceof NotStored) return undefined;
         // Chunks of a shard wait for the same index: whoever asked for it first may have lost interest.
         if (!(error instanceof Abandoned)) throw translated(this.#zarrita, part, error);
       }
@@ -208,11 +233,16 @@ function checkSizes({ shape, chunks }: ZarrArray<'uint8'>, axes: AxisName[], par
   const wanted = `must be ${axes.length} whole numbers above 0, one for each axis`;
   if (!isCounts(shape, MOST_VOXELS)) throw badZarr(`${part}.shape`, `${wanted}, got ${shown(shape)}`);
   if (!isCounts(chunks, MOST_VOXELS)) throw badZarr(`${part}.chunk_shape`, `${wanted}, got ${shown(chunks)}`);
-  const voxels = chunks.reduce((product, size) => product * size, 1);
-  if (voxels <= LARGEST_CHUNK) return;
+}
+
+/** Returns the number of bytes of a chunk as zarrita decodes it; throws `too-large` for one that does not fit. */
+function chunkBytes({ chunks, dtype }: ZarrArray<'uint8'>, part: string): number {
+  const size = Number(/\d+$/.exec(dtype)?.[0]) / 8;
+  const bytes = chunks.reduce((product, size) => product * size, size);
+  if (bytes <= LARGEST_CHUNK) return bytes;
   throw new VesicleError(
     'too-large',
-    `OME-Zarr: ${part}: chunks of ${shown(chunks)} voxels; at most ${LARGEST_CHUNK} can be read`,
+    `OME-Zarr: ${part}: chunks of ${shown(chunks)} voxels of ${size} bytes; at most ${LARGEST_CHUNK} bytes can be read`,
   );
 }
 

@@ -3,6 +3,7 @@ import type { Group, Location, Readable, Array as ZarrArray } from 'zarrita';
 import { endingTogether } from '../abort.js';
 import { invalid } from '../check.js';
 import type { Warning } from '../warning.js';
+import { boundDecoders } from './codecs.js';
 import { badZarr, RefusedError, translated, type Zarrita } from './error.js';
 import { checkPyramid, checkSeries, Level, type Selection } from './levels.js';
 import { parseMultiscale } from './multiscales.js';
@@ -16,7 +17,10 @@ export async function importZarrita(): Promise<Zarrita> {
     throw invalid('zarrita', 'this package, 0.7 or newer, is needed to read OME-Zarr: npm install zarrita');
   }
   // New in 0.7.
-  if (typeof zarrita.isZarritaError === 'function') return zarrita;
+  if (typeof zarrita.isZarritaError === 'function') {
+    boundDecoders(zarrita);
+    return zarrita;
+  }
   throw invalid('zarrita', 'version 0.7 or newer is needed to read OME-Zarr');
 }
 

@@ -31,6 +31,25 @@ export class HttpError extends Error {
 
 type Key = `/${string}`;
 
+/** Most bytes of a file of metadata. */
+const MOST_METADATA = 2 ** 26;
+
+/** How a file is asked for. Stores get the same, and heed what they know. */
+export interface FileOptions extends GetOptions {
+  /** Most bytes of the file; that of metadata by default. */
+  mostBytes?: number;
+  /** Reject with {@link NotStored} if there is no such file. */
+  mustExist?: boolean;
+}
+
+/** Reason of the rejection for a file that is not there and {@link FileOptions.mustExist | must}. */
+export class NotStored extends Error {}
+
+/** Throws `bad-file` for a file of more bytes than are read of it. */
+export function checkLength(key: string, length: number, most: number): void {
+  if (length > most) throw badZarr(key, `larger than the ${Math.floor(most)} bytes that it may have`);
+}
+
 /** A store that makes its requests to another one. */
 export class Requests implements AsyncReadable {
   /** Present if the other store has it: zarrita asks for it before it reads parts of files. */
@@ -38,25 +57,44 @@ export class Requests implements AsyncReadable {
   readonly #store: Readable;
   readonly #options: RequestOptions;
   readonly #slots: Slots;
+  /** Files that had to exist and did not. */
+  readonly #missing = new Set<Key>();
 
   constructor(store: Readable, options: RequestOptions) {
     this.#store = store;
     this.#options = options;
     this.#slots = new Slots(options.concurrency);
-    if (store.getRange) this.getRange = (key, range, given) => this.#getRange(key, range, given?.signal);
+    if (store.getRange) this.getRange = (key, range, given) => this.#getRange(key, range, given);
   }
 
-  get(key: Key, given?: GetOptions): Promise<Uint8Array | undefined> {
-    return this.#run(key, async (signal) => this.#store.get(key, { signal }), given?.signal);
+  async get(key: Key, given: FileOptions = {}): Promise<Uint8Array | undefined> {
+    const { mostBytes = MOST_METADATA } = given;
+    const options = (signal: AbortSignal): FileOptions => ({ signal, mostBytes });
+    const bytes = await this.#existing(key, given, async (signal) => this.#store.get(key, options(signal)));
+    checkLength(key, bytes?.length ?? 0, mostBytes);
+    return bytes;
   }
 
-  async #getRange(key: Key, range: RangeQuery, signal?: AbortSignal): Promise<Uint8Array | undefined> {
+  async #getRange(key: Key, range: RangeQuery, given: FileOptions = {}): Promise<Uint8Array | undefined> {
     checkRange(key, range);
-    const send = async (signal: AbortSignal) => this.#store.getRange?.(key, range, { signal });
-    const bytes = await this.#run(key, send, signal);
     const length = 'length' in range ? range.length : range.suffixLength;
+    if (given.mostBytes !== undefined) checkLength(key, length, given.mostBytes);
+    const send = async (signal: AbortSignal) => this.#store.getRange?.(key, range, { signal });
+    const bytes = await this.#existing(key, given, send);
     if (bytes === undefined || bytes.length === length) return bytes;
     throw badZarr(key, `truncated: ${bytes.length} of ${length} bytes`);
+  }
+
+  /** Makes a request for a file, unless it must exist and is known not to. */
+  async #existing(
+    key: Key,
+    { mustExist, signal }: FileOptions,
+    send: (signal: AbortSignal) => Promise<Uint8Array | undefined>,
+  ): Promise<Uint8Array | undefined> {
+    const bytes = this.#missing.has(key) ? undefined : await this.#run(key, send, signal);
+    if (bytes !== undefined || !mustExist) return bytes;
+    this.#missing.add(key);
+    throw new NotStored();
   }
 
   async #run<T>(key: Key, send: (signal: AbortSignal) => Promise<T>, signal?: AbortSignal): Promise<T> {
@@ -149,7 +187,7 @@ async function pause(duration: number, signal: AbortSignal | undefined): Promise
 }
 
 /** A number of slots, given to those who ask in their order. */
-class Slots {
+export class Slots {
   #free: number;
   readonly #waiting = new Set<() => void>();
 

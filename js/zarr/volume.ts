@@ -18,6 +18,12 @@ const LARGEST_REGION = 2 ** 32;
 /** Largest number of bytes of a coarsest level that is read when the image is opened. */
 const LARGEST_COARSEST = 256e6;
 
+/** Largest number of its chunks, each of which is a request. */
+const MOST_CHUNKS = 2 ** 14;
+
+/** Largest number of bytes that its chunks have with all that is around its voxels, such as other channels. */
+const MOST_DECODED = 2 ** 31;
+
 /**
  * Constituents of a {@link ZarrVolume}.
  *
@@ -51,6 +57,7 @@ export class ZarrVolume {
   readonly #seen: Set<string>[];
   readonly #bytes: number[];
   #coarsest: VoxelArray | undefined;
+  #unread = '';
   #range: [number, number] | undefined;
   #freed = false;
 
@@ -103,7 +110,7 @@ export class ZarrVolume {
     const { signal } = checkProperties('options', options, ['signal']);
     checkSignal(signal);
     const { min, dims } = checkedBox(box, from.info.dims);
-    const target: Brick = { min, dims, data: allocate(from, dims) };
+    const target = { min, dims, data: allocate(from, dims) };
     await this.#fill(target, level, from, signal);
     const affine = from.info.affine.slice();
     for (const axis of [0, 1, 2] as const) affine[12 + axis] = world(from.info, min, axis);
@@ -112,12 +119,17 @@ export class ZarrVolume {
   }
 
   /**
-   * Smallest and largest finite intensity of the coarsest level; undefined if it has no finite voxel, or is larger than
-   * 256 MB and so was not read when the image was opened.
+   * Smallest and largest finite intensity of the coarsest level; undefined if it has no finite voxel, or was not read
+   * when the image was opened: it is larger than 256 MB, is in more than 16,384 chunks, or those are larger than 2 GB.
    */
   get range(): [number, number] | undefined {
     this.#check();
     return this.#range && [...this.#range];
+  }
+
+  /** Why the coarsest level was not read when the image was opened; empty if it was. */
+  get unread(): string {
+    return this.#unread;
   }
 
   /**
@@ -128,7 +140,8 @@ export class ZarrVolume {
   async readCoarsest(signal: AbortSignal | undefined): Promise<void> {
     const index = this.#levels.length - 1;
     const level = levelAt(this.#levels, index);
-    if (level.bytes > LARGEST_COARSEST) return;
+    this.#unread = whyUnread(level);
+    if (this.#unread) return;
     const { data } = await this.voxels(index, { min: [0, 0, 0], max: level.info.dims }, signal && { signal });
     this.#coarsest = data;
     this.#range = rangeOf(data);
@@ -139,7 +152,7 @@ export class ZarrVolume {
     this.#check();
     const [finest] = this.#levels as [Level];
     const [coarsest, range] = [this.#coarsest, this.#range];
-    if (!coarsest) throw new VesicleError('too-large', 'volume: the coarsest level must not be larger than 256 MB');
+    if (!coarsest) throw new VesicleError('too-large', `volume: ${this.#unread}`);
     if (!range) throw invalid('volume', 'the coarsest level must have a finite voxel');
     return {
       ...{ levels: this.#levels.map(({ info }) => info), type: finest.info.voxelType, fill: finest.fill },
@@ -157,12 +170,17 @@ export class ZarrVolume {
     };
   }
 
-  async #fill(target: Brick, index: number, level: Level, signal: AbortSignal | undefined): Promise<void> {
+  async #fill(
+    target: Brick & { data: VoxelArray },
+    index: number,
+    level: Level,
+    signal: AbortSignal | undefined,
+  ): Promise<void> {
     const chunks = chunksOf(target, level.info.chunks);
     await endingTogether(signal, (signal) => {
       const take = async () => {
         // All take from the same iterator.
-        for (const chunk of chunks) copyOverlap(await this.#brick(index, level, chunk, signal), target);
+        for (const chunk of chunks) copyOverlap(await this.#brick(index, level, chunk, signal), target.data, target);
       };
       return Promise.all(Array.from({ length: this.#concurrency }, take));
     });
@@ -178,11 +196,11 @@ export class ZarrVolume {
     return this.#cache.get(`${index}:${position}`, fetch, signal);
   }
 
-  #count(index: number, position: string, { data }: Brick): void {
+  #count(index: number, position: string, { dims }: Brick): void {
     const seen = this.#seen[index] as Set<string>;
     if (seen.has(position)) return;
     seen.add(position);
-    this.#bytes[index] = (this.#bytes[index] as number) + data.byteLength;
+    this.#bytes[index] = (this.#bytes[index] as number) + volumeOf(dims) * levelAt(this.#levels, index).voxelBytes;
   }
 
   #check(): void {
@@ -234,13 +252,15 @@ function checkedBox(box: ZarrBox, size: Vec3): { min: Vec3; dims: Vec3 } {
   return { min: [...from] as Vec3, dims: [...to].map((end, axis) => end - (from[axis] as number)) as Vec3 };
 }
 
-function allocate({ VoxelArrays }: Level, dims: Vec3): VoxelArray {
-  const bytes = volumeOf(dims) * new VoxelArrays(0).BYTES_PER_ELEMENT;
+function allocate({ VoxelArrays, voxelBytes, fill }: Level, dims: Vec3): VoxelArray {
+  const bytes = volumeOf(dims) * voxelBytes;
   const tooLarge = () =>
     new VesicleError('too-large', `a region of ${dims.join(' × ')} voxels needs ${Math.ceil(bytes / 1e6)} MB`);
   if (bytes > LARGEST_REGION) throw tooLarge();
   try {
-    return new VoxelArrays(volumeOf(dims));
+    const voxels = new VoxelArrays(volumeOf(dims));
+    // Of chunks that are not stored.
+    return fill === 0 ? voxels : voxels.fill(fill);
   } catch {
     throw tooLarge();
   }
@@ -259,19 +279,28 @@ function* chunksOf({ min, dims }: Brick, chunks: Vec3): Generator<Vec3> {
   }
 }
 
-/** Copies the voxels that two bricks share. */
-function copyOverlap(from: Brick, to: Brick): void {
+/** Copies the voxels that a brick shares with a box. */
+function copyOverlap(from: Brick, data: VoxelArray, to: Omit<Brick, 'data'>): void {
+  if (!from.data) return;
   const start = (axis: 0 | 1 | 2) => Math.max(from.min[axis], to.min[axis]);
   const end = (axis: 0 | 1 | 2) => Math.min(from.min[axis] + from.dims[axis], to.min[axis] + to.dims[axis]);
-  const offset = ({ min, dims }: Brick, x: number, y: number, z: number) =>
+  const offset = ({ min, dims }: Omit<Brick, 'data'>, x: number, y: number, z: number) =>
     x - min[0] + dims[0] * (y - min[1] + dims[1] * (z - min[2]));
   const [x, width] = [start(0), end(0) - start(0)];
   for (let z = start(2); z < end(2); z++) {
     for (let y = start(1); y < end(1); y++) {
       const at = offset(from, x, y, z);
-      to.data.set(from.data.subarray(at, at + width), offset(to, x, y, z));
+      data.set(from.data.subarray(at, at + width), offset(to, x, y, z));
     }
   }
+}
+
+/** Returns why a level is not read when the image is opened; an empty text if it is. */
+function whyUnread({ bytes, chunkCount, decodedBytes }: Level): string {
+  if (bytes > LARGEST_COARSEST) return 'the coarsest level must not be larger than 256 MB';
+  if (chunkCount > MOST_CHUNKS) return `the coarsest level must have at most ${MOST_CHUNKS} chunks, got ${chunkCount}`;
+  if (decodedBytes <= MOST_DECODED) return '';
+  return `the chunks of the coarsest level must not be larger than 2 GB, got ${Math.ceil(decodedBytes / 1e6)} MB`;
 }
 
 function rangeOf(data: VoxelArray): [number, number] | undefined {

@@ -706,6 +706,7 @@ describe('an image does not lead elsewhere:', () => {
     };
     const error = await rejection(openZarr(server.url));
     expect([error.code, error.message]).toEqual(['unavailable', expect.stringContaining('redirected to')]);
+    expect(other.log).toEqual([]);
     await server.close();
     await other.close();
   });

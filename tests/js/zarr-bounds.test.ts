@@ -1,0 +1,181 @@
+// `vesicle/zarr` with small files and slow servers that would take much memory, many requests, or all time.
+import { deflateSync, gzipSync } from 'node:zlib';
+import { afterEach, describe, expect, test } from 'vitest';
+import * as zarrita from 'zarrita';
+import { openZarr } from '../../pkg/zarr/index.js';
+import { rejection } from './helpers.js';
+import { type ImageServer, serveImage, TestStore } from './zarr-stores.js';
+
+/** An array's metadata that differ from the usual. */
+interface ArrayJson {
+  shape: number[];
+  chunks: number[];
+  type?: string;
+  codecs?: object[];
+  fill?: number;
+}
+
+const json = (value: unknown) => new TextEncoder().encode(JSON.stringify(value));
+
+/** Returns the files of an image with one level. */
+function image({ shape, chunks, type = 'uint8', codecs = [], fill = 0 }: ArrayJson): Map<string, Uint8Array> {
+  const axes = ['z', 'y', 'x'].map((name) => ({ name, type: 'space' }));
+  const scale = [{ type: 'scale', scale: [1, 1, 1] }];
+  const multiscales = [{ axes, datasets: [{ path: '0', coordinateTransformations: scale }] }];
+  const group = { zarr_format: 3, node_type: 'group', attributes: { ome: { version: '0.5', multiscales } } };
+  const array = {
+    ...{ zarr_format: 3, node_type: 'array', shape, data_type: type, fill_value: fill },
+    chunk_grid: { name: 'regular', configuration: { chunk_shape: chunks } },
+    chunk_key_encoding: { name: 'default', configuration: { separator: '/' } },
+    codecs: [{ name: 'bytes', configuration: { endian: 'little' } }, ...codecs],
+    attributes: {},
+  };
+  return new Map([
+    ['/zarr.json', json(group)],
+    ['/0/zarr.json', json(array)],
+  ]);
+}
+
+const withChunk = (given: ArrayJson, chunk: Uint8Array) => new TestStore(image(given).set('/0/c/0/0/0', chunk));
+
+/** Runs `work`, and returns by how much the memory of the process grew meanwhile, bytes. */
+async function growth(work: () => Promise<unknown>): Promise<number> {
+  const before = process.memoryUsage().rss;
+  let most = before;
+  const timer = setInterval(() => {
+    most = Math.max(most, process.memoryUsage().rss);
+  }, 5);
+  await work();
+  clearInterval(timer);
+  return Math.max(most, process.memoryUsage().rss) - before;
+}
+
+const CUBE = { shape: [8, 8, 8], chunks: [8, 8, 8] };
+const gzip = { name: 'gzip', configuration: { level: 9 } };
+const zeros = (count: number) => new Uint8Array(count);
+
+/** A frame of Zstandard without a size: blocks that repeat a byte, 131,071 times each. */
+function zstdRuns(blocks: number): Uint8Array {
+  const bytes = [0x28, 0xb5, 0x2f, 0xfd, 0, 0x58];
+  for (let i = 1; i <= blocks; i++) {
+    const header = (i === blocks ? 1 : 0) + (1 << 1) + (0x1ffff << 3);
+    bytes.push(header & 255, (header >> 8) & 255, header >> 16, 7);
+  }
+  return Uint8Array.from(bytes);
+}
+
+/** The same with a size. */
+function zstdSized(size: number): Uint8Array {
+  const blocks = zstdRuns(Math.ceil(size / 0x1ffff)).subarray(6);
+  return Uint8Array.from([0x28, 0xb5, 0x2f, 0xfd, 0b1010_0000, ...u32(size), ...blocks]);
+}
+
+/** A header that states how many bytes follow once they are decoded. */
+const bloscOf = (bytes: number) => Uint8Array.from([2, 1, 1, 1, ...u32(bytes), ...u32(bytes), ...u32(32), 0, 0, 0, 0]);
+const u32 = (value: number) => [value & 255, (value >> 8) & 255, (value >> 16) & 255, value >>> 24];
+
+describe('decoders stop at the size of a chunk', () => {
+  const codec = (name: string) => ({ name, configuration: { level: 5, cname: 'lz4', clevel: 5, shuffle: 0 } });
+  test.each([
+    ['gzip in gzip', [gzip, gzip], gzipSync(gzipSync(zeros(64e6)))],
+    ['gzip', [gzip], gzipSync(zeros(64e6))],
+    ['zlib', [codec('zlib')], deflateSync(zeros(64e6))],
+    ['zstd that states its size', [codec('zstd')], zstdSized(64e6)],
+    ['zstd that does not', [codec('zstd')], zstdRuns(8000)],
+    ['blosc', [codec('blosc')], bloscOf(2e9)],
+    ['lz4', [codec('lz4')], Uint8Array.from([...u32(2e9), 1, 2, 3])],
+  ])('%s', async (_, codecs, bytes) => {
+    expect(bytes.length).toBeLessThan(1e5);
+    const store = withChunk({ ...CUBE, codecs }, bytes);
+    const grown = await growth(async () => {
+      const { code, message } = await rejection(openZarr(store));
+      expect([code, message]).toEqual(['bad-file', expect.stringContaining('larger than its chunk')]);
+    });
+    expect(grown).toBeLessThan(60e6);
+  });
+
+  test('for others that use the same zarrita, too, and only for what is larger', async () => {
+    const voxels = Uint8Array.from({ length: 512 }, (_, index) => index);
+    const store = withChunk({ ...CUBE, codecs: [gzip, gzip] }, gzipSync(gzipSync(voxels)));
+    const opened = await openZarr(store);
+    expect((await opened.voxels(0, { min: [0, 0, 0], max: [8, 8, 8] })).data).toEqual(voxels);
+    const array = await zarrita.open.v3(zarrita.root(store).resolve('0'), { kind: 'array' });
+    expect((await array.getChunk([0, 0, 0])).data).toEqual(voxels);
+  });
+});
+
+describe('an image whose metadata promise much', () => {
+  test('chunks that are not stored cost nothing', async () => {
+    const store = new TestStore(image({ shape: [4, 4, 4], chunks: [512, 512, 1024], fill: 9 }));
+    const grown = await growth(async () => {
+      const zarr = await openZarr(store);
+      expect(zarr.range).toEqual([9, 9]);
+      expect((await zarr.voxels(0, { min: [1, 1, 1], max: [2, 3, 4] })).data).toEqual(new Uint8Array(6).fill(9));
+      expect(zarr.loaded()).toEqual([{ chunks: 1, bytes: 64, of: { chunks: 1, bytes: 64 } }]);
+    });
+    expect(grown).toBeLessThan(60e6);
+  });
+
+  test('chunks of one voxel are not all requested when it is opened', async () => {
+    const store = new TestStore(image({ shape: [60, 60, 60], chunks: [1, 1, 1] }));
+    const zarr = await openZarr(store);
+    expect([zarr.range, store.requests.size]).toEqual([undefined, 2]);
+    expect(zarr.unread).toContain('216000');
+    // They can be read where they are wanted.
+    expect((await zarr.voxels(0, { min: [0, 0, 0], max: [2, 2, 2] })).data).toHaveLength(8);
+  });
+
+  test('chunks that are far larger than what they hold of the image', async () => {
+    const zarr = await openZarr(new TestStore(image({ shape: [10, 1, 1], chunks: [1, 16384, 16384] })));
+    expect([zarr.range, zarr.unread]).toEqual([undefined, expect.stringContaining('2 GB')]);
+  });
+
+  test('chunks above the limit, by their bytes', async () => {
+    const store = new TestStore(image({ shape: [4, 4, 4], chunks: [512, 512, 513], type: 'float64' }));
+    expect((await rejection(openZarr(store))).code).toBe('too-large');
+  });
+
+  test('files longer than they may be', async () => {
+    const large = withChunk(CUBE, zeros(1e6));
+    expect((await rejection(openZarr(large))).message).toMatch(/larger than the \d+ bytes that it may have/);
+    const store = new TestStore(image(CUBE).set('/zarr.json', zeros(2 ** 26 + 1)));
+    expect((await rejection(openZarr(store))).message).toContain('/zarr.json');
+  });
+});
+
+describe('a server', () => {
+  let server: ImageServer | undefined;
+  afterEach(() => server?.close());
+
+  test('whose metadata have no end', async () => {
+    server = await serveImage('v3-zstd-zyx');
+    let sent = 0;
+    server.answer = (_, response) => {
+      const more = () => {
+        while (!response.destroyed && response.write(zeros(1e6))) sent += 1e6;
+        sent += 1e6;
+      };
+      response.writeHead(200).on('drain', more);
+      more();
+      return true;
+    };
+    const error = await rejection(openZarr(server.url));
+    expect([error.code, error.message]).toEqual(['unavailable', expect.stringContaining('that were asked for')]);
+    await expect.poll(server.open).toBe(0);
+    expect(sent).toBeLessThan(2e8);
+  });
+
+  test('that drips is not waited for without end', async () => {
+    server = await serveImage('v3-zstd-zyx');
+    server.answer = (_, response) => {
+      const timer = setInterval(() => response.write(' '), 20);
+      response.writeHead(200).once('close', () => clearInterval(timer));
+      return true;
+    };
+    const error = await rejection(openZarr(server.url, { timeoutMs: 100, retries: 3 }));
+    expect([error.code, error.message]).toEqual(['unavailable', expect.stringContaining('slower than')]);
+    await expect.poll(server.open).toBe(0);
+    // Once for Zarr 3, and once for Zarr 2.
+    expect(server.log.length).toBeLessThanOrEqual(3);
+  });
+});
