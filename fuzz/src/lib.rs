@@ -6,6 +6,7 @@ pub mod bytes;
 pub mod edits;
 pub mod memory;
 pub mod meshes;
+pub mod parts;
 // The test of the targets has this file a second time, with its own helpers.
 #[allow(clippy::duplicate_mod, reason = "two programs share one file")]
 #[path = "../../tests/common/random.rs"]
@@ -37,7 +38,7 @@ const fn method(name: &'static str, run: fn(&[u8]), mutations: usize) -> Target 
 }
 
 /// All fuzz targets.
-pub static TARGETS: [Target; 21] = [
+pub static TARGETS: [Target; 22] = [
     reader("nifti", volumes::nifti),
     reader("nrrd", volumes::nrrd),
     reader("metaimage", volumes::metaimage),
@@ -48,6 +49,7 @@ pub static TARGETS: [Target; 21] = [
     reader("obj", meshes::obj),
     reader("glb", meshes::glb),
     reader("gltf", meshes::gltf),
+    method("glb_parts", parts::glb_parts, 3000),
     reader("points", meshes::points),
     method("state_deformable", states::deformable, 300),
     method("state_implicit", states::implicit, 300),

@@ -8,7 +8,9 @@ use super::glb::FORMAT;
 use super::gltf_accessor::{Accessor, compression};
 use super::gltf_buffer::Buffers;
 use super::gltf_material::BaseColor;
+use super::gltf_scene::Part;
 use super::{FormatError, MeshFile};
+use crate::math::order::sort_by_rank;
 use crate::math::{Vec2, Vec3};
 use crate::mesh::{TriangleMesh, WorldPositions};
 use serde_json::Value;
@@ -42,17 +44,13 @@ pub(super) fn triangles(root: &Value, buffers: &Buffers) -> Result<MeshFile, For
     let document = Document { root, buffers };
     document.check_extensions()?;
     let parts = document.parts()?;
-    let mut mesh: Option<TriangleMesh> = None;
-    let mut positions = WorldPositions::default();
-    for part in &parts {
-        let read = part.read(&mut positions)?;
-        mesh = Some(match mesh {
-            Some(before) => merged(before, read),
-            None => read,
-        });
+    if parts.is_empty() {
+        return Err(FormatError::invalid(FORMAT, "meshes", "the scene has no triangles"));
     }
-    let mut mesh =
-        mesh.ok_or_else(|| FormatError::invalid(FORMAT, "meshes", "the scene has no triangles"))?;
+    let (mut mesh, mut positions) = Size::of(&parts).allocate(buffers.size)?;
+    for part in &parts {
+        append(&mut mesh, part.read(&mut positions)?, positions.len());
+    }
     let relative = positions.relative_in(&mesh.triangles);
     (mesh.positions, mesh.origin) = relative.map_err(|error| FormatError::positions(FORMAT, &error))?;
     let frame = document.frame()?.unwrap_or_default();
@@ -71,22 +69,78 @@ pub(super) fn triangles(root: &Value, buffers: &Buffers) -> Result<MeshFile, For
     Ok(file)
 }
 
-/// Returns both meshes as one, with the attributes that both have.
-fn merged(mut mesh: TriangleMesh, part: TriangleMesh) -> TriangleMesh {
-    let first = mesh.positions.len() as u32;
-    mesh.positions.extend(part.positions);
+/// Adds a part to a mesh that has `vertices` vertices with those of the part, without its positions and the attributes that
+/// the mesh does not have.
+fn append(mesh: &mut TriangleMesh, part: TriangleMesh, vertices: usize) {
+    let first = (vertices - part.positions.len()) as u32;
     mesh.triangles.extend(part.triangles.into_iter().map(|t| t.map(|v| v + first)));
-    mesh.normals = concatenated(mesh.normals, part.normals);
-    mesh.uvs = concatenated(mesh.uvs, part.uvs);
-    mesh.colors = concatenated(mesh.colors, part.colors);
-    mesh
+    extend(&mut mesh.normals, part.normals);
+    extend(&mut mesh.uvs, part.uvs);
+    extend(&mut mesh.colors, part.colors);
 }
 
-/// Concatenates two attribute arrays; `None` if either is missing.
-fn concatenated<T>(a: Option<Vec<T>>, b: Option<Vec<T>>) -> Option<Vec<T>> {
-    let mut a = a?;
-    a.extend(b?);
-    Some(a)
+fn extend<T>(all: &mut Option<Vec<T>>, part: Option<Vec<T>>) {
+    if let (Some(all), Some(part)) = (all, part) {
+        all.extend(part);
+    }
+}
+
+/// Largest number of bytes of a mesh whose file is small: nodes may repeat a mesh, so that a small file may stand for any
+/// number of triangles.
+const REPEATED_LIMIT: u64 = 1 << 27;
+
+/// Number of bytes of a mesh for each byte of its file that may always be read: no file without repetition needs more.
+const GROWTH: u64 = 12;
+
+/// The size of a scene as one mesh, known before any of it is read.
+struct Size {
+    vertices: u64,
+    triangles: u64,
+    /// Whether all parts have normals, texture coordinates and colours.
+    attributes: [bool; 3],
+}
+
+impl Size {
+    fn of(parts: &[Part]) -> Self {
+        let mut size = Self { vertices: 0, triangles: 0, attributes: [true; 3] };
+        for Part { primitive, .. } in parts {
+            size.vertices += primitive.vertex_count();
+            size.triangles += primitive.triangle_count();
+            let own = primitive.has_attributes();
+            size.attributes = std::array::from_fn(|k| size.attributes[k] && own[k]);
+        }
+        size
+    }
+
+    /// Returns a mesh without elements and positions, with memory for all of the scene, whose file has `file` bytes.
+    ///
+    /// # Errors
+    /// [`FormatError::TooLarge`] for a scene that is far larger than its file, or does not fit in memory.
+    fn allocate(&self, file: u64) -> Result<(TriangleMesh, WorldPositions), FormatError> {
+        let [normals, uvs, colors] = self.attributes;
+        let vertex = 12 + 12 * u64::from(normals) + 8 * u64::from(uvs) + 12 * u64::from(colors);
+        let bytes = self.vertices.saturating_mul(vertex).saturating_add(self.triangles.saturating_mul(12));
+        let too_large = || FormatError::too_large(FORMAT, "nodes", bytes);
+        if bytes > REPEATED_LIMIT.max(file.saturating_mul(GROWTH)) {
+            return Err(too_large());
+        }
+        let vertices = self.vertices as usize;
+        let mut mesh = TriangleMesh {
+            normals: normals.then(Vec::new),
+            uvs: uvs.then(Vec::new),
+            colors: colors.then(Vec::new),
+            ..TriangleMesh::default()
+        };
+        let mut positions = WorldPositions::default();
+        let reserved = [
+            mesh.triangles.try_reserve_exact(self.triangles as usize),
+            mesh.normals.as_mut().map_or(Ok(()), |all| all.try_reserve_exact(vertices)),
+            mesh.uvs.as_mut().map_or(Ok(()), |all| all.try_reserve_exact(vertices)),
+            mesh.colors.as_mut().map_or(Ok(()), |all| all.try_reserve_exact(vertices)),
+            positions.try_reserve(vertices),
+        ];
+        if reserved.iter().any(Result::is_err) { Err(too_large()) } else { Ok((mesh, positions)) }
+    }
 }
 
 /// A glTF document: its JSON (`root`) and its buffers.
@@ -138,10 +192,10 @@ pub(super) struct Primitive<'a> {
     attributes: &'a Value,
     targets: &'a [Value],
     mode: Mode,
-    positions: Accessor<'a>,
+    pub(super) positions: Accessor<'a>,
     indices: Option<Accessor<'a>>,
     base_color: Option<BaseColor<'a>>,
-    /// Upper bound on the numbers of triangle corners and of vertices.
+    /// Upper bound on the number of triangle corners.
     pub(super) corners: u64,
 }
 
@@ -163,38 +217,63 @@ impl<'a> Primitive<'a> {
             Mode::List => vertices,
             Mode::Strip | Mode::Fan => vertices.saturating_mul(3),
         };
-        let corners = corners.max(positions.count as u64);
         let base_color = BaseColor::of(document, value)?;
         let targets = value["targets"].as_array().map_or(&[][..], Vec::as_slice);
         let document = *document;
         Ok(Some(Self { document, attributes, targets, mode, positions, indices, base_color, corners }))
     }
 
+    /// Returns an upper bound on the number of triangles.
+    fn triangle_count(&self) -> u64 {
+        let vertices = self.indices.as_ref().map_or(self.positions.count, |indices| indices.count) as u64;
+        match self.mode {
+            Mode::List => vertices / 3,
+            Mode::Strip | Mode::Fan => vertices.saturating_sub(2),
+        }
+    }
+
+    /// Returns whether the primitive has normals, texture coordinates and colours.
+    fn has_attributes(&self) -> [bool; 3] {
+        ["NORMAL", &self.uv_set(), "COLOR_0"].map(|name| !self.attributes[name].is_null())
+    }
+
+    /// Returns the name of the texture coordinates for the primitive's base colour texture; those of set 0 if it has none.
+    fn uv_set(&self) -> String {
+        format!("TEXCOORD_{}", self.base_color.as_ref().map_or(0, |base| base.set))
+    }
+
     /// Returns the primitive's triangles with its normals, texture coordinates and colours, morphed by the weights of its
     /// targets.
-    pub(super) fn read(&self, weights: &[f64]) -> Result<TriangleMesh, FormatError> {
-        let vectors = |a: Accessor| (0..a.count).map(|i| a.vector(i)).collect();
+    pub(super) fn read(&self, weights: &[f64]) -> Result<PrimitiveMesh, FormatError> {
+        let (vertices, order) = self.order()?;
+        let vectors = |a: Accessor| vertices.iter().map(|&v| a.vector(v as usize)).collect();
         let mut mesh = TriangleMesh {
-            positions: (0..self.positions.count).map(|i| self.positions.vector(i)).collect(),
-            triangles: self.triangles()?,
+            positions: vertices.iter().map(|&v| self.positions.vector(v as usize)).collect(),
+            triangles: self.triangles(&order),
             normals: self.attribute("NORMAL", &[3])?.map(vectors),
-            uvs: self.uvs()?,
+            uvs: self.uvs(&vertices)?,
             colors: self.attribute("COLOR_0", &[3, 4])?.map(vectors),
             ..TriangleMesh::default()
         };
-        self.morph("POSITION", weights, &mut mesh.positions)?;
+        self.morph("POSITION", weights, &vertices, &mut mesh.positions)?;
         if let Some(normals) = &mut mesh.normals {
-            self.morph("NORMAL", weights, normals)?;
+            self.morph("NORMAL", weights, &vertices, normals)?;
         }
-        Ok(mesh)
+        Ok(PrimitiveMesh { mesh, vertices })
     }
 
     /// Adds the displacements of an attribute by the morph targets, times their weights.
-    fn morph(&self, name: &str, weights: &[f64], vectors: &mut [Vec3]) -> Result<(), FormatError> {
+    fn morph(
+        &self,
+        name: &str,
+        weights: &[f64],
+        vertices: &[u32],
+        vectors: &mut [Vec3],
+    ) -> Result<(), FormatError> {
         for (target, &weight) in self.targets.iter().zip(weights).filter(|&(_, &weight)| weight != 0.0) {
             let Some(accessor) = self.attribute_of(target, name, &[3])? else { continue };
-            for (i, vector) in vectors.iter_mut().enumerate() {
-                let moved = vector.as_dvec3() + accessor.vector(i).as_dvec3() * weight;
+            for (vector, &v) in vectors.iter_mut().zip(vertices) {
+                let moved = vector.as_dvec3() + accessor.vector(v as usize).as_dvec3() * weight;
                 *vector = moved.as_vec3();
             }
         }
@@ -203,10 +282,10 @@ impl<'a> Primitive<'a> {
 
     /// Returns the texture coordinates for the primitive's base colour texture, with its texture transform applied;
     /// those of set 0 if the primitive has no such texture. `None` if the primitive lacks the set.
-    fn uvs(&self) -> Result<Option<Vec<Vec2>>, FormatError> {
-        let set = self.base_color.as_ref().map_or(0, |base| base.set);
-        let Some(a) = self.attribute(&format!("TEXCOORD_{set}"), &[2])? else { return Ok(None) };
-        let uvs = (0..a.count).map(|i| Vec2::new(a.number(i, 0) as f32, a.number(i, 1) as f32));
+    fn uvs(&self, vertices: &[u32]) -> Result<Option<Vec<Vec2>>, FormatError> {
+        let Some(a) = self.attribute(&self.uv_set(), &[2])? else { return Ok(None) };
+        let uv = |v: usize| Vec2::new(a.number(v, 0) as f32, a.number(v, 1) as f32);
+        let uvs = vertices.iter().map(|&v| uv(v as usize));
         Ok(Some(match &self.base_color {
             Some(base) => uvs.map(|uv| base.transform_uv(uv)).collect(),
             None => uvs.collect(),
@@ -239,25 +318,52 @@ impl<'a> Primitive<'a> {
         Ok(Some(accessor))
     }
 
-    /// Returns the triangles of the primitive as vertex indices, with strips and fans expanded.
-    fn triangles(&self) -> Result<Vec<[u32; 3]>, FormatError> {
-        let vertices = self.positions.count;
-        let order: Vec<u32> = match &self.indices {
-            Some(indices) => (0..indices.count).map(|i| indices.number(i, 0) as u32).collect(),
-            None => (0..vertices as u32).collect(),
+    /// Returns an upper bound on the number of vertices.
+    pub(super) fn vertex_count(&self) -> u64 {
+        self.indices.as_ref().map_or(self.positions.count, |indices| indices.count.min(self.positions.count))
+            as u64
+    }
+
+    /// Returns the vertices of the primitive, and their order in its triangles as indices of these. Those that other
+    /// primitives have with the same accessors are left out where there are more than corners.
+    fn order(&self) -> Result<(Vec<u32>, Vec<u32>), FormatError> {
+        let count = self.positions.count;
+        let Some(indices) = &self.indices else {
+            let all: Vec<u32> = (0..count as u32).collect();
+            return Ok((all.clone(), all));
         };
-        if let Some(bad) = order.iter().find(|&&v| v as usize >= vertices) {
-            let problem = format!("vertex index {bad} is out of range; there are {vertices} vertices");
+        let mut order: Vec<u32> = (0..indices.count).map(|i| indices.number(i, 0) as u32).collect();
+        if let Some(bad) = order.iter().find(|&&v| v as usize >= count) {
+            let problem = format!("vertex index {bad} is out of range; there are {count} vertices");
             return Err(FormatError::invalid(FORMAT, "indices", problem));
         }
-        Ok(match self.mode {
+        if count <= order.len() {
+            return Ok(((0..count as u32).collect(), order));
+        }
+        let mut used = order.clone();
+        sort_by_rank(&mut used, |&v| v.into());
+        used.dedup();
+        order.iter_mut().for_each(|v| *v = used.partition_point(|used| used < v) as u32);
+        Ok((used, order))
+    }
+
+    /// Returns the triangles of the primitive, with strips and fans expanded.
+    fn triangles(&self, order: &[u32]) -> Vec<[u32; 3]> {
+        match self.mode {
             Mode::List => order.as_chunks().0.to_vec(),
             Mode::Strip => {
                 (0..).zip(order.windows(3)).map(|(i, w)| [w[0], w[1 + i % 2], w[2 - i % 2]]).collect()
             }
             Mode::Fan => order.windows(2).skip(1).map(|w| [order[0], w[0], w[1]]).collect(),
-        })
+        }
     }
+}
+
+/// The triangles of a primitive.
+pub(super) struct PrimitiveMesh {
+    pub(super) mesh: TriangleMesh,
+    /// Index of each vertex in the accessors.
+    pub(super) vertices: Vec<u32>,
 }
 
 /// Returns an error if a glTF primitive has only compressed data, which this reader cannot decode.

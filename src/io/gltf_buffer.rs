@@ -9,6 +9,8 @@ use std::borrow::Cow;
 pub(super) struct Buffers<'a> {
     buffers: Vec<Result<Cow<'a, [u8]>, FormatError>>,
     files: &'a [(&'a str, &'a [u8])],
+    /// Number of bytes of the buffers that are there.
+    pub(super) size: u64,
 }
 
 impl<'a> Buffers<'a> {
@@ -30,7 +32,9 @@ impl<'a> Buffers<'a> {
                 }),
             }
         };
-        Self { buffers: entries.iter().enumerate().map(bytes).collect(), files }
+        let buffers: Vec<Result<Cow<[u8]>, _>> = entries.iter().enumerate().map(bytes).collect();
+        let size = buffers.iter().flatten().map(|bytes| bytes.len() as u64).sum();
+        Self { buffers, files, size }
     }
 
     /// Returns the bytes of buffer `index`.

@@ -37,10 +37,11 @@ enum Place {
 impl Part<'_> {
     /// Returns the part in world space, but for positions, which are appended to `positions` in double precision.
     pub(super) fn read(&self, positions: &mut WorldPositions) -> Result<TriangleMesh, FormatError> {
-        let mesh = self.primitive.read(&self.weights)?;
+        let read = self.primitive.read(&self.weights)?;
         match &self.place {
-            Place::Skin(skin) => skin.pose(&self.primitive, mesh, positions),
+            Place::Skin(skin) => skin.pose(&self.primitive, read, positions),
             Place::Node(to_world) => {
+                let mesh = read.mesh;
                 positions.extend(mesh.positions.iter().map(|p| to_world.transform_point3(p.as_dvec3())));
                 Ok(mesh.transformed(to_world))
             }
@@ -62,6 +63,8 @@ impl<'a> Document<'a> {
         let nodes = self.nodes()?;
         let mut skins = Skins::new(self, &nodes);
         let (mut parts, mut corners) = (Vec::new(), 0_u64);
+        // Sparse accessors are checked as a whole for each primitive.
+        let is_sparse = self.has_sparse_accessors();
         for node in &nodes {
             let Some(mesh) = unsigned(node.value, "mesh")? else { continue };
             let mesh = self.entry("meshes", mesh)?;
@@ -74,7 +77,9 @@ impl<'a> Document<'a> {
             for place in self.places(node, &mut skins)? {
                 for value in primitives {
                     let primitive = Primitive::new(self, value)?;
-                    let cost = primitive.as_ref().map_or(0, |p| p.corners.saturating_mul(morphs));
+                    let checked = |p: &Primitive| if is_sparse { p.positions.count as u64 } else { 0 };
+                    let cost =
+                        primitive.as_ref().map_or(0, |p| p.corners.max(checked(p)).saturating_mul(morphs));
                     corners = corners.saturating_add(cost.max(PRIMITIVE_COST + weights.len() as u64));
                     if corners > CORNER_LIMIT {
                         return Err(FormatError::too_large(FORMAT, "accessors", corners.saturating_mul(12)));
@@ -85,6 +90,11 @@ impl<'a> Document<'a> {
             }
         }
         Ok(parts)
+    }
+
+    fn has_sparse_accessors(&self) -> bool {
+        let accessors = self.root["accessors"].as_array();
+        accessors.into_iter().flatten().any(|accessor| !accessor["sparse"].is_null())
     }
 
     /// Returns the frame that the only root of the scene states, if it maps positions from that to glTF's space.

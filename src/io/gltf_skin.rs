@@ -2,7 +2,7 @@
 
 use super::FormatError;
 use super::glb::FORMAT;
-use super::gltf::{Document, Primitive, unsigned, unsigned_list};
+use super::gltf::{Document, Primitive, PrimitiveMesh, unsigned, unsigned_list};
 use super::gltf_accessor::Accessor;
 use crate::math::DAffine3;
 use crate::mesh::{TriangleMesh, WorldPositions};
@@ -45,13 +45,13 @@ impl Skin {
     pub(super) fn pose(
         &self,
         primitive: &Primitive,
-        mut mesh: TriangleMesh,
+        PrimitiveMesh { mut mesh, vertices }: PrimitiveMesh,
         positions: &mut WorldPositions,
     ) -> Result<TriangleMesh, FormatError> {
         let influences = Influences::new(primitive)?;
-        let mut maps = Vec::with_capacity(mesh.positions.len());
-        for v in 0..mesh.positions.len() {
-            maps.push(influences.blend(v, &self.0)?);
+        let mut maps = Vec::with_capacity(vertices.len());
+        for v in vertices {
+            maps.push(influences.blend(v as usize, &self.0)?);
         }
         let first = mesh.triangles.first().map_or(0, |triangle| triangle[0] as usize);
         if maps.get(first).is_some_and(|map| map.matrix3.determinant() < 0.0) {

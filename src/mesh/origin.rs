@@ -7,6 +7,7 @@
 use super::{Mesh, MeshError, TriangleMesh};
 use crate::math::order::{rank_f32, sort_by_rank};
 use crate::math::{DAffine3, DVec3, Vec3, box_corners};
+use std::collections::TryReserveError;
 
 /// The largest coordinate, in sizes of the box, up to which positions are relative to the origin of world space: a
 /// thousand edges across the box, each keeps its length to a thousandth. With more, short edges would be rounded; with
@@ -76,6 +77,14 @@ impl WorldPositions {
     /// Returns whether there is no position.
     pub fn is_empty(&self) -> bool {
         self.nearest.is_empty()
+    }
+
+    /// Reserves memory for more positions.
+    ///
+    /// # Errors
+    /// If there is not enough.
+    pub fn try_reserve(&mut self, additional: usize) -> Result<(), TryReserveError> {
+        self.nearest.try_reserve_exact(additional)
     }
 
     /// Appends a position.

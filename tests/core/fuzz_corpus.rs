@@ -104,6 +104,7 @@ replayed!(
     obj,
     glb,
     gltf,
+    glb_parts,
     points,
     state_deformable,
     state_implicit,

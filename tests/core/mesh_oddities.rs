@@ -390,6 +390,66 @@ fn instances_of_a_gltf_mesh() {
     assert!(error.starts_with("GLB: EXT_mesh_gpu_instancing: attributes must be equally many"), "{error}");
 }
 
+/// Returns a GLB whose nodes share one mesh of `count` triangles with normals, all with the same accessors.
+fn shared_mesh(nodes: usize, count: usize) -> Vec<u8> {
+    let nodes = vec![r#"{"mesh":0}"#; nodes].join(",");
+    let vector = format!(r#"{{"bufferView":0,"componentType":5126,"count":{},"type":"VEC3"}}"#, 3 * count);
+    let size = 36 * count;
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{nodes}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0,"NORMAL":0}}}}]}}],
+        "accessors":[{vector}],"bufferViews":[{{"buffer":0,"byteLength":{size}}}],"buffers":[{{"byteLength":{size}}}]}}"#
+    );
+    let mut random = Random(7);
+    let numbers = (0..9 * count).flat_map(|_| random.unit().to_le_bytes());
+    glb(&json, &numbers.collect::<Vec<_>>())
+}
+
+#[test]
+fn a_small_file_does_not_become_a_huge_mesh() {
+    // 20 million triangle corners in 75 kB: fewer than the largest number, but with attributes more than a gigabyte.
+    let file = shared_mesh(5000, 560);
+    assert!(file.len() < 100_000);
+    let error = refusal(&file);
+    assert!(error.starts_with("GLB: nodes: needs 235200000 bytes"), "{error}");
+    // As much as a scene with repeated parts may need.
+    let mesh = parse_mesh(&shared_mesh(40, 560)).unwrap();
+    assert_eq!((mesh.positions.len(), mesh.triangles.len()), (1680, 40 * 560));
+}
+
+#[test]
+fn primitives_that_share_their_vertices_have_those_that_they_use() {
+    // 400 materials of one mesh of 30,000 vertices: as one mesh these would be 12 million.
+    let count = 10_000;
+    let primitive = |k: usize| format!(r#"{{"attributes":{{"POSITION":0,"NORMAL":0}},"indices":{}}}"#, k + 1);
+    let accessor = |k: usize| {
+        let at = 36 * count + 12 * 25 * k;
+        format!(r#"{{"bufferView":1,"byteOffset":{at},"componentType":5125,"count":75,"type":"SCALAR"}}"#)
+    };
+    let size = 36 * count + 12 * count;
+    let list = |entry: &dyn Fn(usize) -> String| (0..400).map(entry).collect::<Vec<_>>().join(",");
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":{},"type":"VEC3"}},{}],
+        "bufferViews":[{{"buffer":0,"byteLength":{}}},{{"buffer":0,"byteLength":{size}}}],
+        "buffers":[{{"byteLength":{size}}}]}}"#,
+        list(&primitive),
+        3 * count,
+        list(&accessor),
+        36 * count
+    );
+    let mut random = Random(8);
+    let mut bytes: Vec<u8> = (0..9 * count).flat_map(|_| random.unit().to_le_bytes()).collect();
+    // From last to first, so that what is left out is not the end.
+    bytes.extend((0..3 * count as u32).rev().flat_map(u32::to_le_bytes));
+    let mesh = parse_mesh(&glb(&json, &bytes)).unwrap();
+    assert_eq!((mesh.positions.len(), mesh.triangles.len()), (3 * count, count));
+    let number = |k: usize| f32::from_le_bytes(bytes[4 * k..4 * k + 4].try_into().unwrap());
+    let corner = mesh.positions[mesh.triangles[0][0] as usize];
+    let last = 9 * count - 3;
+    assert_eq!(corner.to_array(), [number(last), number(last + 1), number(last + 2)]);
+}
+
 #[test]
 fn default_weights_of_morph_targets() {
     // Vertex 2, by the sparse indices, is moved by (0, 20, 2).
