@@ -9,17 +9,18 @@ use vesicle::io::parse_mesh;
 /// Number of vertices in each accessor of positions.
 const VERTICES: usize = 6;
 
-/// Most bytes that a scene may need for each of its triangles, and besides them.
-const MEMORY: [usize; 2] = [600, 4 << 20];
+/// Most bytes that a scene may need for each of its triangles, for each of its parts, and besides them.
+const MEMORY: [usize; 3] = [600, 1500, 4 << 20];
 
 /// Reads a GLB of a scene that the input chooses; it has at most as many triangles as its parts have together, and takes
 /// memory for those only.
 pub fn glb_parts(data: &[u8]) {
     let mut choices = Choices::new(data);
     let scene = Scene::choose(&mut choices);
-    let (json, binary, triangles) = scene.document(&mut choices);
+    let (json, binary, parts) = scene.document(&mut choices);
+    let triangles = parts * scene.triangles();
     let file = container(json.as_bytes(), &binary);
-    let (mut read, most) = (0, MEMORY[0] * triangles + MEMORY[1]);
+    let (mut read, most) = (0, MEMORY[0] * triangles + MEMORY[1] * parts + MEMORY[2]);
     let peak = memory::peak_of(|| read = read_triangles(&file, triangles));
     assert!(peak <= most, "{peak} bytes for {triangles} triangles, of which {read} were read");
 }
@@ -69,7 +70,7 @@ impl Scene {
         }
     }
 
-    /// Returns the JSON and the buffer of the scene, and how many triangles it has at most.
+    /// Returns the JSON and the buffer of the scene, and how many parts it has: primitives in their places.
     fn document(&self, choices: &mut Choices) -> (String, Vec<u8>, usize) {
         let sparse = if self.sparse {
             r#","sparse":{"count":2,"indices":{"bufferView":1,"componentType":5121},"values":{"bufferView":0}}"#
@@ -87,7 +88,7 @@ impl Scene {
             accessor(r#""bufferView":2,"#, 5121, VERTICES, "VEC4", ""),
             accessor(r#""bufferView":0,"#, 5126, VERTICES, "VEC4", ""),
         ];
-        let (nodes, triangles) = self.nodes(choices);
+        let (nodes, parts) = self.nodes(choices);
         let meshes: Vec<String> = self.primitives.iter().map(|&count| self.mesh(count)).collect();
         let json = format!(
             r#"{{"asset":{{"version":"2.0"}},"nodes":[{nodes}],"meshes":[{}],"accessors":[{}],
@@ -97,10 +98,10 @@ impl Scene {
             meshes.join(","),
             accessors.join(",")
         );
-        (json, buffer(choices), triangles)
+        (json, buffer(choices), parts)
     }
 
-    /// Returns the nodes, each the child of an earlier one or of none, and their number of triangles at most.
+    /// Returns the nodes, each the child of an earlier one or of none, and their number of parts.
     fn nodes(&self, choices: &mut Choices) -> (String, usize) {
         let mut children = vec![Vec::new(); self.nodes];
         for node in 1..self.nodes {
@@ -111,13 +112,13 @@ impl Scene {
                 children[parent].push(child.to_string());
             }
         }
-        let (mut nodes, mut triangles) = (Vec::new(), 0);
+        let (mut nodes, mut parts) = (Vec::new(), 0);
         for children in children {
             let mesh = choices.below(self.primitives.len());
-            triangles += self.primitives[mesh] * self.triangles() * self.instances.max(1);
+            parts += self.primitives[mesh] * self.instances.max(1);
             nodes.push(format!(r#"{{"mesh":{mesh}{}{}}}"#, list("children", &children), self.members()));
         }
-        (nodes.join(","), triangles)
+        (nodes.join(","), parts)
     }
 
     fn members(&self) -> String {

@@ -95,8 +95,8 @@ export class Sessions {
   }
 
   async #read(file: File): Promise<void> {
-    const { readSession } = await format();
-    const session = await readSession(new Uint8Array(await file.arrayBuffer()));
+    const [{ readSession }, { unpackApart }] = await Promise.all([format(), import('../archive/apart')]);
+    const session = await readSession(new Uint8Array(await file.arrayBuffer()), unpackApart);
     if (session.lab === this.#lab.id) await this.#open(session);
     else this.#lab.passOn({ lab: session.lab, session, name: '', bytes: new Uint8Array(), params: {} });
   }

@@ -74,9 +74,15 @@ export async function writeSession({ lab, hash, source, content }: Session): Pro
   return zipSync(files);
 }
 
-/** Reads a session. Throws an Error whose message says what is wrong with the file. */
-export async function readSession(bytes: Uint8Array): Promise<Session> {
-  const { [INDEX]: packed, ...parts } = partsOf(bytes);
+/** Unpacks an archive; see {@link unpack}. */
+type Unpack = (archive: Uint8Array, mostBytes: number, refusal: string) => Parts | Promise<Parts>;
+
+/**
+ * Reads a session, which `unpacking` unpacks: the page has a worker do it. Throws an Error whose message says what is wrong
+ * with the file.
+ */
+export async function readSession(bytes: Uint8Array, unpacking: Unpack = unpack): Promise<Session> {
+  const { [INDEX]: packed, ...parts } = await partsOf(bytes, unpacking);
   if (!packed) throw new Error(text('sessions.noIndex'));
   const { version, parts: sums, ...body } = indexOf(strFromU8(packed));
   if (typeof version === 'number' && version > VERSION)
@@ -105,9 +111,9 @@ function decoded(body: unknown, find: (part: string) => Uint8Array): Record<stri
   }
 }
 
-function partsOf(bytes: Uint8Array): Parts {
+async function partsOf(bytes: Uint8Array, unpacking: Unpack): Promise<Parts> {
   try {
-    return unpack(bytes, MOST_BYTES, TOO_LARGE);
+    return await unpacking(bytes, MOST_BYTES, TOO_LARGE);
   } catch (error) {
     throw error instanceof ArchiveTooLarge ? error : new Error(text('sessions.notZip'));
   }
