@@ -12,6 +12,7 @@ import { spawnSegment } from './segment/client';
 import { chooseLanguage, LANGUAGES } from './texts/language';
 import { spawnTrack } from './track/client';
 import { h } from './ui/dom';
+import { mayLose } from './ui/question';
 
 /**
  * The labs (the app's five pages), in the order of the navigation. If none is open yet, an empty or unknown address
@@ -84,16 +85,57 @@ class Labs {
       this.#links.set(id, link);
       nav.append(link);
     }
-    // Remembers the address before it changes, so that the link leads back to the lab as it was.
-    nav.addEventListener('click', () => this.#remember());
+    nav.addEventListener('click', (event) => this.#onLink(event));
     // In the capture phase, before the listeners of the open lab.
-    window.addEventListener('hashchange', () => this.#follow(), true);
+    window.addEventListener('hashchange', (event) => this.#follow(event), true);
     this.#follow();
   }
 
-  #follow(): void {
+  /** Sentences that say what is lost when the open lab is left. */
+  get unsaved(): string[] {
+    return this.#lab?.work.unsaved ?? [];
+  }
+
+  /** Whether the open lab may be left; asks if something is lost. */
+  async mayLeave(losses = this.unsaved): Promise<boolean> {
+    return losses.length === 0 || mayLose(text('work.leave'), losses, text('work.leaveGo'));
+  }
+
+  /** Forgets that something is not saved, since the user has agreed to lose it. */
+  giveUp(): void {
+    this.#lab?.work.settled();
+  }
+
+  #onLink(event: MouseEvent): void {
+    // Before the address changes, so that the link leads back to the lab as it was.
+    this.#remember();
+    const link = [...this.#links.values()].find((one) => one === event.target);
+    const isElsewhere = event.ctrlKey || event.metaKey || event.shiftKey;
+    if (!link || isElsewhere || link.hasAttribute('aria-current') || this.unsaved.length === 0) return;
+    event.preventDefault();
+    void this.mayLeave().then((may) => {
+      if (!may) return;
+      this.giveUp();
+      location.hash = link.hash;
+    });
+  }
+
+  /** Opens the lab of the address, unless it is open. */
+  #follow(event?: HashChangeEvent): void {
     const kind = LABS.find(({ id }) => id === labOf(location.hash));
-    if (kind ? kind !== this.#kind : !this.#kind) void this.#open(kind ?? LABS[0]);
+    if (kind ? kind === this.#kind : this.#kind) return;
+    if (event && this.unsaved.length > 0) void this.#leave(kind ?? LABS[0], event);
+    else void this.#open(kind ?? LABS[0]);
+  }
+
+  /** Opens another lab after a change of the address, if the user agrees to lose what is not saved. */
+  async #leave(kind: LabKind, event: HashChangeEvent): Promise<void> {
+    event.stopImmediatePropagation();
+    // The address is that of the open lab as long as it is.
+    history.replaceState(null, '', event.oldURL);
+    if (!(await this.mayLeave())) return;
+    history.replaceState(null, '', event.newURL);
+    await this.#open(kind);
   }
 
   async #open(kind: LabKind, passedOn?: Handoff): Promise<void> {
@@ -110,7 +152,7 @@ class Labs {
       preloadWorker(kind.spawn);
       const Kind = await kind.load();
       if (turn !== this.#turn) return;
-      this.#lab = new Kind(this.#root, this.#help, (passedOn) => this.#passOn(passedOn));
+      this.#lab = new Kind(this.#root, this.#help, (passedOn) => void this.#passOn(passedOn));
       this.#help.toggleAttribute('disabled', false);
       void this.#lab.start(passedOn);
     } catch (error) {
@@ -121,12 +163,14 @@ class Labs {
     }
   }
 
-  #passOn(passedOn: Handoff): void {
+  async #passOn(passedOn: Handoff): Promise<void> {
+    // What a run has made goes with it.
+    if (!(await this.mayLeave(this.#lab?.work.unsavedByHand))) return;
     this.#remember();
     const kind = LABS.find(({ id }) => id === passedOn.lab) ?? LABS[0];
     // pushState fires no hashchange: the lab is opened here, with the data passed on.
     history.pushState(null, '', `#${kind.id}`);
-    void this.#open(kind, passedOn);
+    await this.#open(kind, passedOn);
   }
 
   #remember(): void {
@@ -173,7 +217,7 @@ function offerLessons(lab: HTMLElement, opener: HTMLElement, panel: HTMLElement)
   if (address) void open();
 }
 
-function offerLanguages(select: HTMLElement): void {
+function offerLanguages(select: HTMLElement, labs: Labs): void {
   const options = Object.entries(LANGUAGES).map(([id, name]) =>
     h('option', { value: id, lang: id, selected: id === LANGUAGE }, name),
   );
@@ -182,8 +226,13 @@ function offerLanguages(select: HTMLElement): void {
   select.title = text('shell.languageHelp');
   select.addEventListener('change', () => {
     const list = select as HTMLSelectElement;
-    if (window.confirm(text('shell.languageConfirm'))) chooseLanguage(list.value);
-    else list.value = LANGUAGE;
+    const chosen = list.value;
+    list.value = LANGUAGE;
+    void labs.mayLeave([text('shell.languageConfirm'), ...labs.unsaved]).then((may) => {
+      if (!may) return;
+      labs.giveUp();
+      chooseLanguage(chosen);
+    });
   });
 }
 
@@ -195,9 +244,12 @@ function openLabs(): void {
   help.setAttribute('aria-label', text('shell.shortcutsLabel'));
   const newTab = h('span', { class: 'visually-hidden' }, text('shell.newTab'));
   element('guide').replaceChildren(text('shell.guide'), newTab);
-  offerLanguages(element('language'));
   offerLessons(lab, element('lessons'), element('lesson'));
-  new Labs(lab, help, nav);
+  const labs = new Labs(lab, help, nav);
+  offerLanguages(element('language'), labs);
+  window.addEventListener('beforeunload', (event) => {
+    if (labs.unsaved.length > 0) event.preventDefault();
+  });
 }
 
 document.documentElement.lang = LANGUAGE;

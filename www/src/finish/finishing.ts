@@ -29,6 +29,8 @@ export class Finishing {
   #client: FinishClient | undefined;
   #opening: Promise<void> | undefined;
   #edited: Edited | undefined;
+  /** Whether a new worker makes edits again after the one before broke. */
+  #isRepeating = false;
   /** Counts the lab's surfaces. */
   #surface = 0;
   /** The surface before the edits, as a PLY file. */
@@ -72,19 +74,21 @@ export class Finishing {
   cancel(): void {
     const client = this.#client;
     if (!client) return;
-    const { log = [], undone = [] } = this.#edited ?? {};
     client.restart({ code: CANCELLED, message: text('controls.cancelled') });
-    // Without it, the surface was still being opened.
-    if (this.initial) {
-      const requests = [
-        client.request('open', this.initial),
-        ...[...log, ...undone].map((edit) => client.request('edit', edit)),
-        ...undone.map(() => client.request('undo', undefined)),
-      ];
-      // They fail only if they are cancelled in turn, or if the worker breaks, which its client reports.
-      Promise.all(requests).catch(() => undefined);
-    }
+    // Requests fail only if they are cancelled in turn, or if the worker breaks, which its client reports.
+    this.#repeat(client).catch(() => undefined);
     this.#events.onCancelled();
+  }
+
+  /** Has a new worker make the edits so far; does nothing if the surface was still being opened. */
+  async #repeat(client: FinishClient): Promise<void> {
+    if (!this.initial) return;
+    const { log = [], undone = [] } = this.#edited ?? {};
+    await Promise.all([
+      client.request('open', this.initial),
+      ...[...log, ...undone].map((edit) => client.request('edit', edit)),
+      ...undone.map(() => client.request('undo', undefined)),
+    ]);
   }
 
   /** Returns the edited surface as a file; undefined if there are no edits, so that the lab's own is the result. */
@@ -120,11 +124,25 @@ export class Finishing {
     this.#events.onChange(edited);
   }
 
-  /** After the worker broke, the next request starts another one. */
+  /**
+   * After the worker broke, only what it was doing is lost: another one makes the edits before again. If that one breaks,
+   * too, they are forgotten, and the next request starts afresh.
+   */
   #lose(): void {
     this.#client?.close();
     this.#client = undefined;
-    this.reset();
     this.#events.onLost();
+    if (!this.initial || !this.#edited || this.#isRepeating) this.reset();
+    else this.#startAgain();
+  }
+
+  #startAgain(): void {
+    this.#isRepeating = true;
+    const client = new FinishClient(() => this.#lose());
+    this.#client = client;
+    const done = () => {
+      this.#isRepeating = false;
+    };
+    this.#repeat(client).then(done, done);
   }
 }

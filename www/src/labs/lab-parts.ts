@@ -219,6 +219,8 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
   readonly #fetchMesh: FetchMesh;
   #edited: EditedView | undefined;
   finish: Finish | undefined;
+  /** Called when the surface was saved as a file. */
+  onSurfaceSaved: () => void = () => undefined;
 
   constructor(
     root: HTMLElement,
@@ -273,6 +275,7 @@ export abstract class RunParts<Example extends Listed> extends LabParts<Example>
     try {
       const bytes = await this.surfaceFile(request);
       this.saving.bytes(format, bytes, type, `${this.suffix}${recentre ? RECENTRED : ''}`);
+      this.onSurfaceSaved();
     } catch (error) {
       const origin = this.finish?.origin ?? this.#edited?.origin;
       if (toFailure(error).code !== 'precision' || !origin) throw error;

@@ -3,6 +3,7 @@ import { GUIDES } from '../guides';
 import type { CodeRequest, CodeRequests, Failure, Measures, RunCode } from '../protocol';
 import type { LabState } from '../state';
 import { plural, text } from '../texts';
+import { mayLose } from '../ui/question';
 import { labShortcuts, offerShortcuts, type Shortcut } from '../ui/shortcuts';
 import { copyAddress, FILE_NOTE, showAddress } from './address';
 import type { Listed } from './example-panel';
@@ -11,6 +12,7 @@ import type { LabStates } from './lab-states';
 import type { Handoff, Lab, OpenInLab } from './labs';
 import type { Opening, Source } from './opening';
 import { Sessions } from './sessions';
+import { Work } from './work';
 
 /** Events that the workers of all labs send. */
 type EngineEvent = { event: 'failure'; failure: Failure } | { event: 'state'; state: 'running' | 'paused' | 'done' };
@@ -48,6 +50,7 @@ type AnySource<Example> = Source<Example, unknown, unknown>;
  * {@link begin} at the end of its constructor.
  */
 export abstract class LabShell<Example extends Listed> implements Lab {
+  readonly work = new Work();
   protected readonly root: HTMLElement;
   protected readonly passOn: OpenInLab;
   /** Aborted when the lab is closed, which removes all event listeners. */
@@ -96,7 +99,10 @@ export abstract class LabShell<Example extends Listed> implements Lab {
       ...{ id: this.id, ui: this.ui, states: this.states, opening: this.opening, passOn: this.passOn },
       address: (source) => this.address(source),
       content: () => this.sessionContent(),
+      onSaved: () => this.work.settled(),
+      mayReplace: () => this.mayReplace(),
     });
+    this.opening.onReplaced = () => this.work.settled();
     this.states.subscribe((state) => this.#showState(state));
     const onEscape = {
       key: 'Escape',
@@ -114,7 +120,7 @@ export abstract class LabShell<Example extends Listed> implements Lab {
       this.forgetSession();
       this.updateAddress();
     };
-    await this.opening.start(this.closing.signal, onFollowed, open);
+    await this.opening.start(this.closing.signal, { mayFollow: () => this.mayReplace(), onFollowed }, open);
   }
 
   close(): void {
@@ -129,16 +135,25 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   protected labEvents(): Omit<LabEvents<Example>, 'onParam'> {
     return {
       onFiles: (files) => void this.#sessions?.files(files),
-      onExample: (example) => {
-        this.forgetSession();
-        void this.opening.example(example);
-      },
+      onExample: (example) => void this.#openExample(example),
       onCancel: () => void this.opening.cancel(),
       onDismiss: () => this.dismiss(),
       onCopyLink: () => void this.#copyLink(),
       onSaveSession: (included) => void this.#sessions?.save(included),
       onError: (title, error) => this.states.fail(title, error),
     };
+  }
+
+  /** Whether other data may take the place of those that are open; asks if work by hand would be lost. */
+  protected async mayReplace(): Promise<boolean> {
+    const losses = this.work.unsavedByHand;
+    return losses.length === 0 || mayLose(text('work.replace'), losses, text('work.replaceGo'));
+  }
+
+  async #openExample(example: Example): Promise<void> {
+    if (!(await this.mayReplace())) return this.ui.data.choose(this.opening.source?.example);
+    this.forgetSession();
+    await this.opening.example(example);
   }
 
   /** Writes what is open and the settings in force into the page's address, so that it can be shared. */
@@ -249,7 +264,18 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
   protected beginRuns(own: Shortcut[] = [], toggleText?: string): void {
     this.begin(labShortcuts(this.runEvents(), own, toggleText));
     const { finish, status } = this.ui;
-    if (finish) finish.onEdited = (edited) => status.say(edited ? describeEdited(edited) : this.describe());
+    this.ui.onSurfaceSaved = () => this.surfaceSaved();
+    if (!finish) return;
+    finish.onEdited = (edited) => {
+      if (edited) this.work.did('edited');
+      else this.work.settled('edited');
+      status.say(edited ? describeEdited(edited) : this.describe());
+    };
+  }
+
+  /** Called when the surface was saved as a file: by default, all that was made is in it. */
+  protected surfaceSaved(): void {
+    this.work.settled();
   }
 
   /** Takes the events that the workers of all labs send; returns whether this was one of them. */
@@ -290,7 +316,10 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
     const running = this.states.value === 'running';
     if (!running && !this.canPlay) return;
     this.ui.banner.hide();
-    if (!running) this.beforeRun(text('labs.play'), false);
+    if (!running) {
+      this.beforeRun(text('labs.play'), false);
+      this.work.did('run');
+    }
     this.ask(this.client.request(running ? 'pause' : 'play', undefined));
   }
 
@@ -298,6 +327,7 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
     if (!this.canStep || this.states.value === 'running') return;
     this.ui.banner.hide();
     this.beforeRun(plural('counts.step', steps), true);
+    this.work.did('run');
     this.ui.finish?.reset();
     this.ask(this.client.request('step', { count: steps }));
   }

@@ -3,6 +3,7 @@ import type { ParamValues } from '../protocol';
 import type { Session } from '../session/file';
 import type { Warning } from '../warnings';
 import type { LAB_IDS } from './address';
+import type { Work } from './work';
 
 /**
  * Data that one lab passes to another: a volume for Extract, with suitable parameters, a mesh for Sculpt, or a session of
@@ -23,6 +24,8 @@ export interface Handoff {
 
 /** A lab that is open, as the page controls it. */
 export interface Lab {
+  /** What the user has made and not saved. */
+  readonly work: Work;
   start(passedOn?: Handoff): Promise<void>;
   /** Releases the worker, GPU memory and event listeners. */
   close(): void;

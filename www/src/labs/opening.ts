@@ -42,6 +42,14 @@ interface OpeningParts<Example> {
   data: { choose(example: Example | undefined): void };
 }
 
+/** How a lab follows changes of the page's address. */
+interface Following {
+  /** Whether what is open may be replaced. */
+  mayFollow: () => Promise<boolean>;
+  /** Called after each change that was followed; corrects an address that could not be. */
+  onFollowed: () => void;
+}
+
 /** The lab's worker, as needed to restart it. */
 interface Engine {
   restart(failure: Failure): void;
@@ -75,6 +83,9 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    * broken, and is restarted with what is displayed.
    */
   #modelMismatch = false;
+
+  /** Called when other data have taken the place of those that were open. */
+  onReplaced: () => void = () => undefined;
 
   constructor(engine: Engine, ui: OpeningParts<Example>, states: LabStates) {
     this.#engine = engine;
@@ -159,10 +170,13 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
 
   /**
    * Opens what another lab passes on, or what the address asks for, or else the first example, unless the user has
-   * opened something while the engine was loading; then follows changes of the address until `signal` is aborted. After each such change, `onFollowed` is called, which corrects an address
-   * that could not be followed.
+   * opened something while the engine was loading; then follows changes of the address until `signal` is aborted.
    */
-  async start(signal: AbortSignal, onFollowed: () => void, passedOn?: () => Promise<void>): Promise<void> {
+  async start(
+    signal: AbortSignal,
+    { mayFollow, onFollowed }: Following,
+    passedOn?: () => Promise<void>,
+  ): Promise<void> {
     try {
       const greeting = this.#greet();
       this.#started = greeting.catch(() => undefined);
@@ -172,7 +186,15 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       return;
     }
     if (signal.aborted) return;
-    window.addEventListener('hashchange', () => void this.#link().then(onFollowed), { signal });
+    const follow = async ({ oldURL, newURL }: HashChangeEvent) => {
+      // The address is that of the open data as long as they are.
+      history.replaceState(null, '', oldURL);
+      if (!(await mayFollow()) || signal.aborted) return;
+      history.replaceState(null, '', newURL);
+      await this.#link();
+      onFollowed();
+    };
+    window.addEventListener('hashchange', (event) => void follow(event), { signal });
     if (this.#requestCount === 0) await (passedOn ? passedOn() : this.#link(this.first));
   }
 
@@ -199,12 +221,19 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   }
 
   /**
-   * Opens the user's files; if a link names a file that the user has yet to open, its settings are applied to these
-   * files.
+   * Opens the user's files; if a link names a file that the user has yet to open, its settings are applied to that file, and
+   * to no other.
    */
-  files(files: File[]): Promise<void> {
-    const linked = this.#awaiting;
-    return this.open({ ...this.fromFiles(files), ...(linked && { linked }) });
+  async files(files: File[]): Promise<void> {
+    const source = this.fromFiles(files);
+    const waiting = this.#awaiting;
+    const linked = waiting?.file === source.name ? waiting : undefined;
+    await this.open({ ...source, ...(linked && { linked }) });
+    if (!waiting || linked || this.#source?.name !== source.name || this.#ui.banner.shown) return;
+    this.#ui.banner.show(
+      text('labs.linkOtherFile', { name: source.name }),
+      text('labs.linkNeedsFileHint', { file: waiting.file ?? '' }),
+    );
   }
 
   /** Opens the data of a session, its example or else `files`, and continues it. */
@@ -304,7 +333,8 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       this.states.finishOpening(true);
       this.#source = this.sourceToRemember(source, opened, data);
       this.#modelMismatch = false;
-      if (!reopening) this.#awaiting = undefined;
+      if (!reopening) this.onReplaced();
+      if (source.linked && source.linked === this.#awaiting) this.#awaiting = undefined;
       const adoption = this.adopt(opened, source, reopening);
       this.#adoption = adoption.catch(() => undefined);
       await adoption;

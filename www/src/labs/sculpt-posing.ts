@@ -37,11 +37,14 @@ export class Posing {
   readonly #ui: SculptParts;
   readonly #settings: SculptSettings;
   #mode: HandleMode = 'move';
+  /** Called before each change of a pose. */
+  readonly #onChange: () => void;
   /** Id of the timer that ends a series of key presses. */
   #resting = 0;
 
-  constructor(ui: SculptParts, settings: SculptSettings) {
+  constructor(ui: SculptParts, settings: SculptSettings, onChange: () => void) {
     this.#ui = ui;
+    this.#onChange = onChange;
     this.#settings = settings;
     ui.view.onPick = (index) => settings.choose(index);
     ui.view.handles.onDragStart = () => this.#checkpoint(DONE[this.#mode], false);
@@ -76,6 +79,7 @@ export class Posing {
       [0, size, 0],
       [0, 0, size],
     ];
+    this.#onChange();
     this.#settings.checkpoint(text('sculpt.newEllipsoidChange'));
     this.#settings.send([...pose, { center, axes: [x, y, z] }], false, [...names, '']);
     this.#settings.choose(pose.length);
@@ -87,6 +91,7 @@ export class Posing {
     if (chosen === undefined || pose.length < 2) return;
     const name = this.#settings.nameOf(chosen);
     const others = <T>(list: T[]) => list.filter((_, index) => index !== chosen);
+    this.#onChange();
     this.#settings.checkpoint(text('sculpt.removedEllipsoidChange'));
     this.#settings.send(others(pose), false, others(names));
     this.#settings.choose(undefined);
@@ -113,6 +118,7 @@ export class Posing {
   #checkpoint(what: string, merge: boolean): void {
     const { chosen } = this.#settings;
     if (chosen === undefined) return;
+    this.#onChange();
     const label = text('sculpt.ellipsoidChange', { name: this.#settings.nameOf(chosen), what });
     this.#settings.checkpoint(label, merge ? label : '');
   }

@@ -60,7 +60,7 @@ export class SculptLab extends RunLab<SculptExample> {
     this.states = states;
     this.#results = new SculptResults(client, ui, states, history, (frame) => this.#follow(frame));
     this.#settings = new SculptSettings(client, ui, states, history, () => this.#showSettings());
-    this.#posing = new Posing(ui, this.#settings);
+    this.#posing = new Posing(ui, this.#settings, () => this.work.did('shaped'));
     this.#filming = new Filming(client, ui, states, this.#settings);
     this.opening = new SculptOpening(client, ui, states, (opened, source) => this.#adopt(opened, source));
     const addKey = () => this.#filming.addKey();

@@ -89,7 +89,11 @@ export class SegmentLab extends LabShell<SegmentExample> {
         this.#released = undefined;
         ui.status.say(reason);
       },
-      onUndo: (undoable, redoable) => ui.tools.showUndo(undoable, redoable),
+      onUndo: (undoable, redoable) => {
+        if (undoable) this.work.did('painted');
+        else this.work.settled('painted');
+        ui.tools.showUndo(undoable, redoable);
+      },
       onError: (title, error) => states.fail(title, error),
     });
     this.opening = new SegmentOpening(this.client, ui, states, {
@@ -112,8 +116,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
       onMapFiles: (files) => void this.#openLabels(files),
       onParam: (name, value) => void this.#setParam(name, value),
       onOptions: () => this.#optionsChanged(),
-      onSaveMap: (format) =>
-        this.ask(saveMap(format, this.client, this.ui.saving, this.#editing.labels), text('segment.saveFailed')),
+      onSaveMap: (format) => this.ask(this.#saveMap(format), text('segment.saveFailed')),
       onSaveSurfaces: (format) => this.#saveSurfaces(format),
       onReset: () => void this.#reset(),
       onActive: (value) => this.#editing.setActive(value),
@@ -205,7 +208,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   /** Opens a label map of the open volume in place of the present one. */
   async #openLabels(files: File[]): Promise<void> {
     const volume = this.#volume;
-    if (!volume || !this.states.canChange) return;
+    if (!volume || !this.states.canChange || !(await this.mayReplace())) return;
     const name = nameOf(files);
     this.states.load(text('labs.opening', { name }));
     try {
@@ -411,6 +414,11 @@ export class SegmentLab extends LabShell<SegmentExample> {
     return [text('segment.linkLacksLabels')];
   }
 
+  async #saveMap(format: Parameters<typeof saveMap>[0]): Promise<void> {
+    await saveMap(format, this.client, this.ui.saving, this.#editing.labels);
+    this.work.settled('painted');
+  }
+
   #saveSurfaces(format: SurfaceFormat, recentre = false): void {
     this.ui.offer.hide();
     const surfaces = this.ui.view.surfaces();
@@ -428,6 +436,6 @@ export class SegmentLab extends LabShell<SegmentExample> {
   async #reset(): Promise<void> {
     const { source } = this.opening;
     if (this.states.engineBroken) await this.opening.reopen();
-    else if (this.states.canChange && source) await this.opening.again();
+    else if (this.states.canChange && source && (await this.mayReplace())) await this.opening.again();
   }
 }

@@ -30,6 +30,10 @@ interface SessionLab {
   // biome-ignore lint/suspicious/noExplicitAny: as above
   address: (source: Source<any, any, any>) => string;
   content: () => Promise<Record<string, unknown> | undefined>;
+  /** Called when a session was saved. */
+  onSaved: () => void;
+  /** Whether other data may take the place of those that are open. */
+  mayReplace: () => Promise<boolean>;
 }
 
 const format = () => import('../session/file');
@@ -48,6 +52,7 @@ export class Sessions {
   async files(files: File[]): Promise<void> {
     const [file] = files;
     const { states, opening } = this.#lab;
+    if (!(await this.#lab.mayReplace())) return;
     try {
       if (file && files.length === 1 && (await isSession(file))) await this.#read(file);
       else if (this.#waiting) await this.#complete(this.#waiting, files);
@@ -89,6 +94,7 @@ export class Sessions {
         content: { ...body, edits, undone, ...(warnings.length > 0 && { warnings }) },
       });
       ui.saving.bytes('vesicle.zip', bytes, 'application/zip');
+      this.#lab.onSaved();
     } catch (error) {
       states.fail(text('sessions.saveFailed'), error);
     }

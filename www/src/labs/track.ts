@@ -95,7 +95,7 @@ export class TrackLab extends RunLab<TrackExample> {
       onMoved: () => this.#results?.showFigures(),
       onCompare: (other) => void this.#compare(other),
       onCancelCompare: () => this.ask(this.client.request('cancelCompare', undefined)),
-      onSave: (what) => this.ask(saveTrack(what, this.client, this.ui, this.#results), text('track.fileFailed')),
+      onSave: (what) => this.ask(this.#save(what), text('track.fileFailed')),
       onSculpt: () => this.#frameToSculpt(),
     };
   }
@@ -136,6 +136,16 @@ export class TrackLab extends RunLab<TrackExample> {
     if (!moments) return undefined;
     const view = { ...this.ui.view.pose, options: this.ui.options.value, frame: this.#results.frame };
     return { ...(await import('./track-session')).packTrack(moments), view };
+  }
+
+  async #save(what: Parameters<typeof saveTrack>[0]): Promise<void> {
+    await saveTrack(what, this.client, this.ui, this.#results);
+    if (what !== 'table') this.work.settled('run');
+  }
+
+  /** The surface of one frame is not the run. */
+  protected override surfaceSaved(): void {
+    this.work.settled('edited');
   }
 
   protected override codeRequest(): { frame: number } {
