@@ -124,7 +124,7 @@ class Labs {
   #follow(event?: HashChangeEvent): void {
     const kind = LABS.find(({ id }) => id === labOf(location.hash));
     if (kind ? kind === this.#kind : this.#kind) return;
-    if (event && this.unsaved.length > 0) void this.#leave(kind ?? LABS[0], event);
+    if (event?.oldURL && this.unsaved.length > 0) void this.#leave(kind ?? LABS[0], event);
     else void this.#open(kind ?? LABS[0]);
   }
 

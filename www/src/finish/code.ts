@@ -44,9 +44,6 @@ const ARGUMENTS: Arguments = {
   cut: ({ origin, normal }) => [{ origin, normal }],
 };
 
-/** Returns whether a session may have an edit of this name. */
-export const isEdit = (op: string): boolean => Object.hasOwn(ARGUMENTS, op);
-
 function argumentsOf(edit: Edit): unknown[] {
   return (ARGUMENTS[edit.op] as (edit: Edit) => unknown[])(edit);
 }

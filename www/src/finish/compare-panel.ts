@@ -1,3 +1,4 @@
+import { csvOf } from '../csv';
 import { text } from '../texts';
 import { h, uniqueId } from '../ui/dom';
 import { acceptDropsOn, fileChooser, nameOf, readFiles, VOLUME_FILES } from '../ui/files';
@@ -192,7 +193,7 @@ export class ReferencePanel {
     const lines = DIRECTIONS.map(([name]) => [name, ...MEASURES.map(([measure]) => found[name][measure])]);
     const warnings = cellOf(this.#events.warnings());
     const rest = [['dice', found.dice ?? ''], ...(warnings ? [['warnings', warnings]] : [])];
-    const all = [head, ...lines, ...rest].map((line) => line.join(','));
-    this.#events.onSave('csv', new TextEncoder().encode(`${all.join('\n')}\n`), 'text/csv', '-comparison');
+    const table = csvOf([head, ...lines, ...rest]);
+    this.#events.onSave('csv', new TextEncoder().encode(table), 'text/csv', '-comparison');
   }
 }

@@ -5,7 +5,6 @@ import { text } from '../texts';
 import { folded } from '../ui/dom';
 import type { MeasurePanel } from '../ui/measures';
 import type { Warning } from '../warnings';
-import { isEdit } from './code';
 import { ReferencePanel } from './compare-panel';
 import { EditPanel } from './edit-panel';
 import type { EditedView } from './edited-view';
@@ -93,10 +92,7 @@ export class Finish {
 
   /** Makes edits of a session again, also those that were undone there, which can be redone then. */
   async repeat(edits: Edit[], undone: Edit[]): Promise<void> {
-    for (const edit of [...edits, ...undone]) {
-      if (!isEdit(edit.op)) throw new Error(text('sessions.badIndex'));
-      await this.#finishing.change('edit', edit);
-    }
+    for (const edit of [...edits, ...undone]) await this.#finishing.change('edit', edit);
     for (const _ of undone) await this.#finishing.change('undo', undefined);
   }
 

@@ -1,3 +1,4 @@
+import { csvOf } from '../csv';
 import type { History } from '../ui/history';
 import { cellOf, keyOf, merged, type Warning } from '../warnings';
 
@@ -30,7 +31,7 @@ export function toCsv({ reports }: History, warnings: readonly Warning[] = [], r
     ...parts.map((part) => Number((report.times[part] ?? 0).toFixed(3))),
     ...(warned ? [cellOf(merged(ofData, report.warnings ?? []))] : []),
   ]);
-  return `${[head, ...lines].map((line) => line.join(',')).join('\n')}\n`;
+  return csvOf([head, ...lines]);
 }
 
 const millisecondsHeader = (part: string) => `${part} (ms)`;

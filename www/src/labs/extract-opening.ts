@@ -3,20 +3,20 @@ import { EXAMPLES, type Example, exampleUrl } from '../examples';
 import { defaultStart, exampleById } from '../presets';
 import type { ImageSource, LargeSource, Loaded, NamedBytes, ParamSpec, ParamValues, Setup } from '../protocol';
 import type { Session } from '../session/file';
-import { restoreView } from '../session/recognise';
+import { contentOf } from '../session/recognise';
+import type { ContentOf } from '../session/schema';
 import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
 import type { StartChoice } from '../ui/start';
-import type { ViewOptions } from '../ui/view-options';
-import type { StageView } from '../view/stage';
 import { fetchBytes, preload } from './downloads';
 import type { ExtractParts } from './extract-parts';
 import type { ExtractResults } from './extract-results';
-import { type ExtractMoments, type ExtractSettings, isExtractMoment } from './extract-settings';
+import type { ExtractMoments, ExtractSettings } from './extract-settings';
 import type { LabStates } from './lab-states';
 import type { Handoff } from './labs';
 import { fromHash, type Linked, withLink } from './link';
+import { LinkError, readLink } from './link-query';
 import { Opening, type Source } from './opening';
 
 export type ExtractSource = Source<Example, Linked, ImageSource>;
@@ -65,7 +65,9 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
    * while the engine loads.
    */
   static fetchLinked(): void {
-    const linked = fromHash(location.hash);
+    const linked = readLink(() => fromHash(location.hash));
+    // Opening says what is wrong.
+    if (linked instanceof LinkError) return;
     const example = linked?.example ? exampleById(linked.example) : EXAMPLES[0];
     if (example && !linked?.file && 'file' in example.source) preload(exampleUrl(example.source.file));
   }
@@ -134,7 +136,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     this.#ui.adopt(volume, source, labels);
     if (source.linked?.color) this.#ui.options.set({ color: source.linked.color });
     this.#settings.adopt(volume, choice, params, setup.attractors);
-    if (moments) return this.#resume(moments, source.session?.content.view);
+    if (moments) return this.#resume(moments, source.session && contentOf(source.session, 'extract').view);
     this.#settings.checkpoint(text('labs.play'));
     await this.#client.request('play', undefined);
   }
@@ -158,12 +160,11 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
   }
 
   /** Continues a session: shows its state and view, and does not run it. */
-  #resume(moments: ExtractMoments, view: unknown): void {
+  #resume(moments: ExtractMoments, view: ContentOf<'extract'>['view']): void {
     this.#settings.resume(moments);
-    restoreView(view, (shown) => {
-      this.#ui.options.set(shown.options as Partial<ViewOptions>);
-      this.#ui.stage.view = shown as unknown as StageView;
-    });
+    if (!view) return;
+    this.#ui.options.set(view.options);
+    this.#ui.stage.view = view;
   }
 
   protected override kept(): void {
@@ -229,14 +230,15 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
   }
 }
 
-async function momentsOf({ content }: Session): Promise<ExtractMoments> {
+async function momentsOf(session: Session): Promise<ExtractMoments> {
   const { unpackMoments } = await import('../session/moments');
-  return unpackMoments(content, isExtractMoment);
+  return unpackMoments(contentOf(session, 'extract'));
 }
 
 /** Returns the frame of a 4D volume that a source opens, counted from 0: that of its link or session. */
 export function frameOf({ linked, session }: ExtractSource): number {
-  return (session ? fromHash(session.hash) : linked)?.frame ?? 0;
+  const settings = session ? readLink(() => fromHash(session.hash)) : linked;
+  return settings instanceof LinkError ? 0 : (settings?.frame ?? 0);
 }
 
 function transferable(source: ImageSource): Transferable[] {

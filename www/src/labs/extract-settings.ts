@@ -2,7 +2,6 @@ import { type Client, toFailure } from '../client';
 import type { Preset, Variant } from '../presets';
 import type { Attractor, ParamValues, SavedRun, Setup, StartShape, Vec3, VolumeView } from '../protocol';
 import type { Moments } from '../session/moments';
-import { isLog, isRecord } from '../session/recognise';
 import { plural, text } from '../texts';
 import type { HistoryMark } from '../ui/history';
 import type { StartChoice } from '../ui/start';
@@ -32,20 +31,6 @@ interface PageState {
 }
 
 export type ExtractMoments = Moments<SavedMoment<PageState, SavedRun>>;
-
-/** Tests whether saved data, of a model and of the page, may be those of a state of this lab. */
-export function isExtractMoment(saved: Record<string, unknown>, page: Record<string, unknown>): boolean {
-  const { levels, done, log } = saved;
-  const { choice, params, attractors } = page;
-  return (
-    isLog(log) &&
-    typeof levels === 'number' &&
-    typeof done === 'boolean' &&
-    isRecord(choice) &&
-    isRecord(params) &&
-    Array.isArray(attractors)
-  );
-}
 
 /**
  * Manages the settings that the Extract lab's model is built and run with: changes them, sends them to the worker, and

@@ -12,7 +12,7 @@ import { ExtractSettings } from './extract-settings';
 import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { Handoff, OpenInLab } from './labs';
-import { linkOf, toHash } from './link';
+import { linkOf, MOST_ATTRACTORS, toHash } from './link';
 
 /** The Extract lab: a deformable surface is fitted to a volume. Opening, settings and results are in files of their own. */
 export class ExtractLab extends RunLab<Example> {
@@ -92,6 +92,10 @@ export class ExtractLab extends RunLab<Example> {
     if (!moments) return undefined;
     const view = { ...this.ui.stage.view, options: this.ui.options.value };
     return { ...(await import('../session/moments')).packMoments(moments), view };
+  }
+
+  protected override linkLacks(): (string | false)[] {
+    return [this.#settings.attractors.length > MOST_ATTRACTORS && text('extract.linkLacksAttractors')];
   }
 
   #showSettings(): void {

@@ -5,10 +5,13 @@ import { defaultStart, exampleById, isPreset, PAPER } from '../presets';
 import type { Attractor, ParamValues, Vec3 } from '../protocol';
 import { isStartKind, type StartChoice } from '../ui/start';
 import type { ColorMode } from '../ui/view-options';
+import { listsIn, numbersIn, paramsIn, queryOf, textsIn } from './link-query';
 
 export const ADDRESS = '#extract';
 /** Significant digits of a sphere, which is about a tenth of the volume: finer than any click. */
 const DIGITS = 7;
+/** Most attractors that a link includes: some programs truncate long addresses. */
+export const MOST_ATTRACTORS = 100;
 
 /**
  * Version number of the defaults that a link relies on. Links without a version were written when the defaults were an
@@ -57,7 +60,7 @@ export interface LabSettings {
 
 /**
  * Returns what a link to the lab's present state contains: the settings that differ from those of the example, or else
- * from the method's defaults, and all attractors.
+ * from the method's defaults, and all attractors unless they are too many.
  */
 export function linkOf(settings: LabSettings): Linked {
   const { example, file, frame, choice, sphere, params, defaults, attractors, color } = settings;
@@ -74,7 +77,7 @@ export function linkOf(settings: LabSettings): Linked {
     ...(choice.levels !== usual.levels && { levels: choice.levels }),
     ...(choice.edge !== usual.edge && { edge: choice.edge ?? 0 }),
     params: differing(params, { ...defaults, ...example?.params }),
-    attractors,
+    attractors: attractors.length <= MOST_ATTRACTORS ? attractors : [],
     ...(color !== 'plain' && { color }),
   };
 }
@@ -122,25 +125,21 @@ export function toHash(linked: Linked): string {
  * parsed are ignored; whether names and values are valid is not checked here.
  */
 export function fromHash(hash: string): Linked | undefined {
-  const [address, text] = hash.split(/\?(.*)/s, 2);
-  if (address !== ADDRESS || !text) return undefined;
-  const query = new URLSearchParams(text);
-  const linked: Linked = { params: {}, attractors: [] };
-  for (const name of ['example', 'file', 'start'] as const) {
-    const value = query.get(name);
-    if (value) linked[name] = value;
-  }
-  for (const name of ['frame', 'bubbles', 'levels', 'edge'] as const) {
-    const value = Number(query.get(name) ?? Number.NaN);
-    if (Number.isFinite(value)) linked[name] = value;
-  }
-  const [sphere] = listsOf(query, 'sphere', 4);
-  if (sphere) linked.sphere = { center: sphere.slice(0, 3) as Vec3, radius: sphere[3] ?? 1 };
-  for (const [x = 0, y = 0, z = 0, strength = 0, radius = 1] of listsOf(query, 'attractor', 5))
-    linked.attractors.push({ point: [x, y, z], strength, radius });
-  for (const [name, value] of query) if (name.startsWith('p.')) linked.params[name.slice(2)] = readValue(value);
-  const color = query.get('color');
-  if (color) linked.color = color as ColorMode;
+  const query = queryOf(hash, ADDRESS);
+  if (!query) return undefined;
+  const [sphere] = listsIn(query, 'sphere', 4, 1);
+  const attractors = listsIn(query, 'attractor', 5, MOST_ATTRACTORS);
+  const { color, ...names } = textsIn(query, ['example', 'file', 'start', 'color']);
+  const linked: Linked = {
+    ...names,
+    ...numbersIn(query, ['frame', 'bubbles', 'levels', 'edge']),
+    ...(sphere && { sphere: { center: sphere.slice(0, 3) as Vec3, radius: sphere[3] ?? 1 } }),
+    params: paramsIn(query),
+    attractors: attractors.map(([x = 0, y = 0, z = 0, strength = 0, radius = 1]) => {
+      return { point: [x, y, z], strength, radius };
+    }),
+    ...(color && { color: color as ColorMode }),
+  };
   return query.has('v') ? linked : asBefore(linked);
 }
 
@@ -151,15 +150,4 @@ export function fromHash(hash: string): Linked | undefined {
 function asBefore(linked: Linked): Linked {
   if (isPreset(exampleById(linked.example ?? ''))) return linked;
   return { start: 'enclosing', ...linked, params: { ...PAPER, ...linked.params } };
-}
-
-/** Parses the value of a parameter in a link: a number if possible, else the text. */
-export function readValue(text: string): unknown {
-  const value = Number(text);
-  return text !== '' && Number.isFinite(value) ? value : text;
-}
-
-function listsOf(query: URLSearchParams, name: string, length: number): number[][] {
-  const lists = query.getAll(name).map((text) => text.split(',').map(Number));
-  return lists.filter((list) => list.length === length && list.every(Number.isFinite));
 }

@@ -7,6 +7,7 @@ import type { ErrorBanner, StatusLine } from '../ui/status';
 import type { Warning } from '../warnings';
 import type { LabStates } from './lab-states';
 import type { Handoff } from './labs';
+import { LinkError, readLink } from './link-query';
 
 /** Milliseconds that a busy worker has to save its model before it is terminated because the user cancels. */
 const SAVE_TIMEOUT_MS = 1000;
@@ -188,9 +189,9 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     if (signal.aborted) return;
     const follow = async ({ oldURL, newURL }: HashChangeEvent) => {
       // The address is that of the open data as long as they are.
-      history.replaceState(null, '', oldURL);
+      if (oldURL) history.replaceState(null, '', oldURL);
       if (!(await mayFollow()) || signal.aborted) return;
-      history.replaceState(null, '', newURL);
+      if (newURL) history.replaceState(null, '', newURL);
       await this.#link();
       onFollowed();
     };
@@ -291,7 +292,11 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    * `otherwise`, if given; if the address names an unknown example or the user's file, a banner says so.
    */
   async #link(otherwise?: Example): Promise<void> {
-    const linked = this.linkedBy(location.hash);
+    const linked = readLink(() => this.linkedBy(location.hash));
+    if (linked instanceof LinkError) {
+      if (otherwise) await this.example(otherwise);
+      return this.#ui.banner.show(text('labs.linkInvalid'), linked.message);
+    }
     const example = linked && this.#exampleOf(linked);
     if (linked && example) return this.example(example, linked);
     if (otherwise) await this.example(otherwise);
@@ -331,13 +336,17 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       const opened = await this.#load(source, data, reopening);
       if (request !== this.#requestCount) return;
       this.states.finishOpening(true);
+      const before = this.#source;
       this.#source = this.sourceToRemember(source, opened, data);
       this.#modelMismatch = false;
       if (!reopening) this.onReplaced();
       if (source.linked && source.linked === this.#awaiting) this.#awaiting = undefined;
       const adoption = this.adopt(opened, source, reopening);
       this.#adoption = adoption.catch(() => undefined);
-      await adoption;
+      await adoption.catch((error) => {
+        if (!source.session) throw error;
+        return request === this.#requestCount ? this.#openInstead(before, source, error) : undefined;
+      });
     } catch (error) {
       if (request === this.#requestCount) await this.#failed(source, error, reopening);
     }
@@ -375,6 +384,26 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     const own = this.#requestCount;
     await opening;
     if (own === this.#requestCount && this.states.value !== 'error') this.#ui.banner.show(title, why);
+  }
+
+  /**
+   * Opens what was open before a session, or the first example, after the session could be shown in part only, and says
+   * why.
+   */
+  async #openInstead(
+    before: Source<Example, Linked, Data> | undefined,
+    failed: Source<Example, Linked, Data>,
+    error: unknown,
+  ): Promise<void> {
+    const { code, message } = toFailure(error);
+    if (code === 'internal') this.states.engineBroken = true;
+    // After a failure of the engine, the session itself was open.
+    this.#source = before?.session === failed.session ? undefined : before;
+    const opening = this.open(this.#source ?? this.fromExample(this.first));
+    const own = this.#requestCount;
+    await opening;
+    if (own === this.#requestCount && this.states.value !== 'error')
+      this.#ui.banner.show(text('labs.openFailed', { name: failed.name }), message);
   }
 
   /** Opens a link's example or file without the link's settings, after one of them was rejected, and says why. */

@@ -5,7 +5,8 @@ import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { isCloudPreset } from '../reconstruct/presets';
 import type { Edits } from '../reconstruct/protocol';
 import type { CloudChoice } from '../ui/cloud-setup';
-import { differing, readValue } from './link';
+import { differing } from './link';
+import { listsIn, numbersIn, paramsIn, queryOf, textsIn } from './link-query';
 
 const ADDRESS = '#reconstruct';
 /** Significant digits of coordinates: finer than any click. */
@@ -115,29 +116,19 @@ export function toHash(linked: LinkedCloud): string {
  * parsed are ignored; whether names and values are valid is not checked here.
  */
 export function fromHash(hash: string): LinkedCloud | undefined {
-  const [address = '', text] = hash.split(/\?(.*)/s);
-  if (address !== ADDRESS || !text) return undefined;
-  const query = new URLSearchParams(text);
-  const removed = (query.get('remove') ?? '').split(',').filter(Boolean).map(Number);
+  const query = queryOf(hash, ADDRESS);
+  if (!query) return undefined;
+  const removed = (query.get('remove') ?? '').split(',', MOST_EDITS).filter(Boolean).map(Number);
+  const pointsIn = (name: string) => listsIn(query, name, 3, MOST_EDITS) as Vec3[];
   const edits = {
-    added: pointsOf(query, 'add'),
-    outside: pointsOf(query, 'outside'),
+    added: pointsIn('add'),
+    outside: pointsIn('outside'),
     removed: [...new Set(removed)].filter((index) => Number.isInteger(index) && index >= 0),
   };
-  const linked: LinkedCloud = { params: {}, edits };
-  for (const name of ['example', 'file', 'color'] as const) {
-    const value = query.get(name);
-    if (value) linked[name] = value;
-  }
-  for (const name of ['maxPoints', 'keepComponents', 'photo'] as const) {
-    const value = Number(query.get(name) ?? Number.NaN);
-    if (Number.isFinite(value)) linked[name] = value;
-  }
-  for (const [name, value] of query) if (name.startsWith('p.')) linked.params[name.slice(2)] = readValue(value);
-  return linked;
-}
-
-function pointsOf(query: URLSearchParams, name: string): Vec3[] {
-  const lists = query.getAll(name).map((text) => text.split(',').map(Number));
-  return lists.filter((list) => list.length === 3 && list.every(Number.isFinite)) as Vec3[];
+  return {
+    ...textsIn(query, ['example', 'file', 'color']),
+    ...numbersIn(query, ['maxPoints', 'keepComponents', 'photo']),
+    params: paramsIn(query),
+    edits,
+  };
 }

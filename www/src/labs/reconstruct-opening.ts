@@ -10,7 +10,8 @@ import type {
   SavedSurface,
   Setup,
 } from '../reconstruct/protocol';
-import { isLog, isRecord } from '../session/recognise';
+import { contentOf } from '../session/recognise';
+import type { ContentOf } from '../session/schema';
 import { text } from '../texts';
 import type { CloudChoice } from '../ui/cloud-setup';
 import type { LabStates } from './lab-states';
@@ -80,7 +81,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
 
   protected async load(origin: CloudOrigin, { source, photographs }: Data): Promise<OpenedCloud> {
     const from = source ?? (await this.#presentPoints());
-    const saved = origin.session && savedIn(origin.session.content);
+    const saved = origin.session && savedIn(contentOf(origin.session, 'reconstruct'));
     const setup = saved?.setup ?? this.#setupFor(origin, source === undefined);
     const cameras = photographs.map(({ view }) => view);
     const loaded = await this.#client.request('load', { source: from, cameras, setup, saved });
@@ -149,14 +150,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
   }
 }
 
-/** Returns the saved model in the content of a session; throws an Error if it is damaged. */
-function savedIn({ state, model }: Record<string, unknown>): SavedSurface {
-  const setup = isRecord(model) && model.setup;
-  const hasState = state instanceof Uint8Array && isRecord(model) && isLog(model.log);
-  if (!hasState || !isRecord(setup) || !isRecord(setup.params) || !isRecord(setup.edits))
-    throw new Error(text('sessions.badIndex'));
-  return { ...(model as object), state } as SavedSurface;
-}
+const savedIn = ({ state, model }: ContentOf<'reconstruct'>): SavedSurface => ({ ...model, state });
 
 function firstVariant(example: CloudExample): CloudVariant | undefined {
   return isCloudPreset(example) ? example.variants[0] : undefined;

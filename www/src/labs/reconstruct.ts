@@ -1,13 +1,13 @@
 import { ReconstructClient } from '../reconstruct/client';
 import type { CloudExample } from '../reconstruct/examples';
 import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from '../reconstruct/presets';
-import type { ParamValues, PointQuantity, StepReport, WorkerEvent } from '../reconstruct/protocol';
-import { restoreView } from '../session/recognise';
+import type { ParamValues, PointQuantity, WorkerEvent } from '../reconstruct/protocol';
+import { contentOf } from '../session/recognise';
+import type { ContentOf } from '../session/schema';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { History } from '../ui/history';
 import type { CloudViewOptions } from '../view/reconstruction';
-import type { CameraPose } from '../view/viewport';
 import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { OpenInLab } from './labs';
@@ -87,19 +87,19 @@ export class ReconstructLab extends RunLab<CloudExample> {
     this.ui.options.set({ color, points: true, constraints: false, ...(isCloudPreset(example) && example.view) });
     this.ui.photos.choose(photoFor(example, linked?.photo));
     this.#settings.showParams(params);
-    if (session) return this.#resume(session.content);
+    if (session) return this.#resume(contentOf(session, 'reconstruct'));
     await this.client.request('play', undefined);
   }
 
   /** Continues a session, whose model has been restored: shows its state and view, and does not run it. */
-  async #resume({ undo, redo, reports, view }: Record<string, unknown>): Promise<void> {
-    this.#settings.entries = { undo, redo } as ReconstructSettings['entries'];
-    const [list = []] = reports as StepReport[][];
+  async #resume({ undo, redo, reports, view }: ContentOf<'reconstruct'>): Promise<void> {
+    this.#settings.entries = { undo, redo };
+    const [list = []] = reports;
     this.#history.rewind({ reports: list, iteration: Number.POSITIVE_INFINITY });
-    restoreView(view, ({ options, camera }) => {
-      this.ui.options.set(options as Partial<CloudViewOptions>);
-      this.ui.view.pose = camera as CameraPose;
-    });
+    if (view) {
+      this.ui.options.set(view.options);
+      this.ui.view.pose = view.camera;
+    }
     // Sends the surface, its measures and the state.
     await this.client.request('step', { count: 0 });
     const state = list.at(-1)?.done ? 'done' : 'paused';

@@ -4,11 +4,17 @@ import { fromNumbers, lengthsOf, toNumbers } from '../sculpt/ellipsoids';
 import { SCENES, type SculptExample } from '../sculpt/examples';
 import type { Film } from '../sculpt/film';
 import type { Pose } from '../sculpt/protocol';
-import { differing, readValue } from './link';
+import { differing } from './link';
+import { allIn, paramsIn, queryOf, textsIn } from './link-query';
 
 const ADDRESS = '#sculpt';
 /** Most keyframes that a link includes: some programs truncate long addresses. */
 export const MOST_KEYS = 12;
+/** Most ellipsoids of a pose that a link includes. */
+const MOST_ELLIPSOIDS = 60;
+
+/** Tests whether a pose has few enough ellipsoids for a link. */
+export const fits = (pose: Pose | undefined): boolean => (pose?.length ?? 0) <= MOST_ELLIPSOIDS;
 
 /**
  * Settings of the Sculpt lab that are contained in a link; missing ones are as in the example, or else the method's
@@ -48,13 +54,14 @@ export interface SceneSettings {
  * parameters that differ from `usual`; keyframes only if there are at most {@link MOST_KEYS}.
  */
 export function linkOf({ example, file, params, usual, pose, film, color, layout }: SceneSettings): LinkedScene {
-  const own = film !== example?.film && film && 'keys' in film && film.keys.length <= MOST_KEYS;
+  const own =
+    film !== example?.film && film && 'keys' in film && film.keys.length <= MOST_KEYS && film.keys.every(fits);
   const looped = film?.loop !== undefined && film.loop !== (example?.film?.loop ?? false);
   return {
     ...(!example && { file }),
     ...(example && example !== SCENES[0] && { example: example.id }),
     params: differing(params, usual),
-    ...(pose && { pose }),
+    ...(pose && fits(pose) && { pose }),
     ...(own && { keys: film.keys, between: film.between }),
     ...(looped && { loop: film.loop }),
     ...(color !== (example?.color ?? 'plain') && { color }),
@@ -91,7 +98,7 @@ function rounding(step: number): (value: number) => number {
 }
 
 function asPose(text: string): Pose | undefined {
-  const pose = text.split(';').map((one) => fromNumbers(one.split(',').map(Number)));
+  const pose = text.split(';', MOST_ELLIPSOIDS).map((one) => fromNumbers(one.split(',').map(Number)));
   return pose.every((one) => one !== undefined) ? pose : undefined;
 }
 
@@ -114,21 +121,18 @@ export function toHash(linked: LinkedScene): string {
  * parsed are ignored; whether names and values are valid is not checked here.
  */
 export function fromHash(hash: string): LinkedScene | undefined {
-  const [address = '', text] = hash.split(/\?(.*)/s);
-  if (address !== ADDRESS || !text) return undefined;
-  const query = new URLSearchParams(text);
-  const linked: LinkedScene = { params: {} };
-  for (const name of ['example', 'file', 'color', 'layout'] as const) {
-    const value = query.get(name);
-    if (value) linked[name] = value;
-  }
+  const query = queryOf(hash, ADDRESS);
+  if (!query) return undefined;
+  const linked: LinkedScene = {
+    ...textsIn(query, ['example', 'file', 'color', 'layout']),
+    params: paramsIn(query),
+  };
   const between = Number(query.get('between') ?? Number.NaN);
   if (Number.isInteger(between) && between > 0) linked.between = between;
   if (query.has('loop')) linked.loop = query.get('loop') === 'true';
   const pose = asPose(query.get('pose') ?? '');
   if (pose) linked.pose = pose;
-  const keys = query.getAll('key').flatMap((key) => [asPose(key) ?? []].filter(({ length }) => length > 0));
+  const keys = allIn(query, 'key', MOST_KEYS).flatMap((key) => [asPose(key) ?? []].filter(({ length }) => length > 0));
   if (keys.length > 0) linked.keys = keys;
-  for (const [name, value] of query) if (name.startsWith('p.')) linked.params[name.slice(2)] = readValue(value);
   return linked;
 }

@@ -1,8 +1,8 @@
 import type { SculptClient } from '../sculpt/client';
 import { SCENES, type SculptExample } from '../sculpt/examples';
 import { isSculptPreset, sceneById } from '../sculpt/presets';
-import type { NamedBytes, OpenedScene, PoseLog, SceneSource } from '../sculpt/protocol';
-import { isLog, isRecord } from '../session/recognise';
+import type { NamedBytes, OpenedScene, SceneSource } from '../sculpt/protocol';
+import { contentOf } from '../session/recognise';
 import { text } from '../texts';
 import type { LabStates } from './lab-states';
 import type { Handoff } from './labs';
@@ -10,7 +10,7 @@ import { fromExample, fromFiles } from './mesh-files';
 import { Opening, type Source } from './opening';
 import { fromHash, type LinkedScene } from './sculpt-link';
 import type { SculptParts } from './sculpt-parts';
-import { isSculptMoment, type SculptMoments } from './sculpt-settings';
+import type { SculptMoments } from './sculpt-settings';
 
 export type SculptSource = Source<SculptExample, LinkedScene, SceneSource>;
 
@@ -74,11 +74,12 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
   protected async load({ name, example, linked, session }: SculptSource, meshes: SceneSource): Promise<OpenedPose> {
     if (session) {
       const { unpackMoments } = await import('../session/moments');
-      const moments: SculptMoments = unpackMoments(session.content, isSculptMoment);
+      const content = contentOf(session, 'sculpt');
+      const moments: SculptMoments = unpackMoments(content);
       const { saved } = moments.now;
-      const log = isLog(session.content.log) ? (session.content.log as PoseLog | undefined) : undefined;
+      const { log } = content;
       // The state fits a model of the parameters that its own was built with, not of those in force.
-      const params = log?.setup.params ?? (isRecord(session.content.params) ? session.content.params : {});
+      const params = log?.setup.params ?? content.params;
       const setup = { start: saved.start, params, pose: undefined };
       return { ...(await this.#client.request('open', { source: meshes, setup, saved, log })), moments };
     }

@@ -20,11 +20,6 @@ interface PageState {
 
 export type SculptMoments = Moments<SavedMoment<PageState, SavedPose>>;
 
-/** Tests whether saved data, of a model and of the page, may be those of a state of this lab. */
-export function isSculptMoment(saved: Record<string, unknown>, page: Record<string, unknown>): boolean {
-  return Array.isArray(saved.start) && typeof saved.frame === 'number' && Array.isArray(page.names);
-}
-
 /** The settings that a scene (meshes and ellipsoids) of the Sculpt lab opens with. */
 export interface Adopted {
   pose: Pose;

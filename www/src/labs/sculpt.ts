@@ -3,18 +3,19 @@ import type { SculptExample } from '../sculpt/examples';
 import { lastFrame } from '../sculpt/film';
 import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
 import type { FrameContents, FrameEvent, ParamValues, SculptQuantity, WorkerEvent } from '../sculpt/protocol';
-import { restoreView } from '../session/recognise';
+import { contentOf } from '../session/recognise';
+import type { ContentOf } from '../session/schema';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
 import type { SculptViewOptions } from '../view/sculpture';
-import type { CameraPose } from '../view/viewport';
 import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { OpenInLab } from './labs';
+import { LinkError, readLink } from './link-query';
 import { Filming } from './sculpt-filming';
-import { filmOf, fromHash, linkOf, toHash } from './sculpt-link';
+import { filmOf, fits, fromHash, linkOf, toHash } from './sculpt-link';
 import { type OpenedPose, SculptOpening, type SculptSource } from './sculpt-opening';
 import { type PartEvents, SculptParts } from './sculpt-parts';
 import { Posing } from './sculpt-posing';
@@ -100,7 +101,8 @@ export class SculptLab extends RunLab<SculptExample> {
    * pose from a link, or if the film loops and the user prefers reduced motion, the surface only settles in the pose.
    */
   async #adopt(opened: OpenedPose, { name, example, session, ...source }: SculptSource): Promise<void> {
-    const linked = session ? fromHash(session.hash) : source.linked;
+    const settings = session ? readLink(() => fromHash(session.hash)) : source.linked;
+    const linked = settings instanceof LinkError ? undefined : settings;
     this.states.ready = true;
     this.#usual = { ...opened.params };
     for (const [name, value] of Object.entries(linked?.params ?? {}))
@@ -123,7 +125,7 @@ export class SculptLab extends RunLab<SculptExample> {
       ...preset?.view,
     });
     if (preset?.stages) this.#results.showStages(preset.stages);
-    if (opened.moments) return this.#resume(opened.moments, session?.content.view);
+    if (opened.moments) return this.#resume(opened.moments, session && contentOf(session, 'sculpt').view);
     await this.#settings.setFilm(film, 0);
     await this.client.request('show', this.#shown);
     const endless = film?.loop === true && prefersReducedMotion();
@@ -131,14 +133,12 @@ export class SculptLab extends RunLab<SculptExample> {
   }
 
   /** Continues a session: shows its state and view, and does not run it. */
-  async #resume(moments: SculptMoments, view: unknown): Promise<void> {
-    restoreView(view, ({ options }) => this.ui.options.set(options as Partial<SculptViewOptions>));
+  async #resume(moments: SculptMoments, view: ContentOf<'sculpt'>['view']): Promise<void> {
+    if (view) this.ui.options.set(view.options);
     await this.client.request('show', this.#shown);
     await this.#settings.resume(moments);
     this.states.idle(this.#results.describe('paused'));
-    restoreView(view, ({ camera }) => {
-      this.ui.view.pose = camera as CameraPose;
-    });
+    if (view) this.ui.view.pose = view.camera;
   }
 
   protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {
@@ -149,6 +149,10 @@ export class SculptLab extends RunLab<SculptExample> {
     if (!moments) return undefined;
     const view = { camera: this.ui.view.pose, options: this.ui.options.value };
     return { ...(await import('../session/moments')).packMoments(moments), params: this.#settings.params, log, view };
+  }
+
+  protected override linkLacks(): (string | false)[] {
+    return [!fits(this.#settings.pose) && text('sculpt.linkLacksPose')];
   }
 
   #openVariant(preset: SculptPreset, { name, params, pose }: SculptVariant): void {

@@ -2,7 +2,8 @@
 import type { ParamValues } from '../protocol';
 import { SEGMENT_EXAMPLES, type SegmentExample } from '../segment/examples';
 import type { SegmentViewOptions } from '../view/segmentation';
-import { differing, readValue } from './link';
+import { differing } from './link';
+import { numbersIn, paramsIn, queryOf, textsIn } from './link-query';
 
 const ADDRESS = '#segment';
 
@@ -52,23 +53,16 @@ export function toHash({ example, file, params, view }: LinkedSegment): string {
  * parsed are ignored; whether parameters and view options are valid is not checked here.
  */
 export function fromHash(hash: string): LinkedSegment | undefined {
-  const [address = '', text] = hash.split(/\?(.*)/s);
-  if (address !== ADDRESS || !text) return undefined;
-  const query = new URLSearchParams(text);
-  const linked: LinkedSegment = { params: {}, view: viewIn(query) };
-  for (const name of ['example', 'file'] as const) {
-    const value = query.get(name);
-    if (value) linked[name] = value;
-  }
-  for (const [name, value] of query) if (name.startsWith('p.')) linked.params[name.slice(2)] = readValue(value);
-  return linked;
+  const query = queryOf(hash, ADDRESS);
+  return query && { ...textsIn(query, ['example', 'file']), params: paramsIn(query), view: viewIn(query) };
 }
 
 function viewIn(query: URLSearchParams): Partial<SegmentViewOptions> {
   const view: Partial<SegmentViewOptions> = {};
-  const [slices, opacity] = [query.get('slices'), Number(query.get('opacity') ?? Number.NaN)];
+  const { slices } = textsIn(query, ['slices']);
+  const { opacity } = numbersIn(query, ['opacity']);
   for (const name of ['edges', 'outlines'] as const) if (query.has(name)) view[name] = query.get(name) === 'true';
   if (slices) view.slices = slices as SegmentViewOptions['slices'];
-  if (Number.isFinite(opacity)) view.opacity = opacity;
+  if (opacity !== undefined) view.opacity = opacity;
   return view;
 }

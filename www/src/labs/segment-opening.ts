@@ -2,6 +2,7 @@ import { exampleUrl } from '../examples';
 import type { SegmentClient } from '../segment/client';
 import { SEGMENT_EXAMPLES, type SegmentExample, segmentExampleById } from '../segment/examples';
 import type { ImageSource, LabelArray, NamedBytes, OpenedImage, ParamSpec } from '../segment/protocol';
+import { contentOf } from '../session/recognise';
 import { nameOf, readFiles } from '../ui/files';
 import { fetchBytes } from './downloads';
 import type { LabStates } from './lab-states';
@@ -9,7 +10,6 @@ import type { Handoff } from './labs';
 import { Opening, type Source } from './opening';
 import { fromHash, type LinkedSegment } from './segment-link';
 import type { SegmentParts } from './segment-parts';
-import { sessionOf } from './segment-session';
 
 export type SegmentSource = Source<SegmentExample, LinkedSegment, ImageSource>;
 
@@ -72,7 +72,7 @@ export class SegmentOpening extends Opening<SegmentExample, LinkedSegment, Image
   protected async load(origin: SegmentSource, source: ImageSource, reopening: boolean): Promise<OpenedImage> {
     const { name, linked, session } = origin;
     if (session && !reopening) {
-      const { params, voxels: labels, state } = sessionOf(session.content);
+      const { params, voxels: labels, state } = contentOf(session, 'segment');
       return this.#client.request('open', { name, source, params, labels, state });
     }
     const labels = reopening ? this.#lab.labels() : undefined;

@@ -10,15 +10,15 @@ import type {
   VolumeView,
   WorkerEvent,
 } from '../segment/protocol';
-import { restoreView } from '../session/recognise';
+import { contentOf } from '../session/recognise';
+import type { ContentOf } from '../session/schema';
 import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import type { LabelMeasures } from '../ui/label-measures';
-import { isToolSettings, type Tool, type ToolSettings, usesRange } from '../ui/segment-tools';
+import { type Tool, type ToolSettings, usesRange } from '../ui/segment-tools';
 import type { Shortcut } from '../ui/shortcuts';
 import type { Overlays } from '../view/label-overlay';
-import type { SegmentView, SegmentViewOptions } from '../view/segmentation';
 import { LabShell } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { OpenInLab } from './labs';
@@ -28,7 +28,6 @@ import { SegmentOpening, type SegmentSource } from './segment-opening';
 import { factsOf, MAP_FACT } from './segment-page';
 import { type PartEvents, SegmentParts, type SurfaceFormat } from './segment-parts';
 import { saveMap, saveSurfaces } from './segment-saving';
-import { sessionOf } from './segment-session';
 import { spaceOf, unitOf } from './surface-space';
 
 /** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
@@ -174,7 +173,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
     this.#forgetMask();
     this.ui.view.setVolume(volume, { dims: volume.dims, voxels, ...NO_OVERLAYS });
     if (reopening) this.#editing.readopt(volume, opened);
-    else if (session) this.#resume(opened, session.content);
+    else if (session) this.#resume(opened, contentOf(session, 'segment'));
     else {
       this.#editing.adopt(volume, opened, example?.labels ?? []);
       this.ui.tools.set({ range: example?.range ?? [...volume.window] });
@@ -185,14 +184,13 @@ export class SegmentLab extends LabShell<SegmentExample> {
   }
 
   /** Continues a session: its list of labels, tools and view. */
-  #resume(opened: OpenedImage, content: Record<string, unknown>): void {
-    this.#editing.resume(opened.volume, opened, sessionOf(content));
-    if (isToolSettings(content.tools)) this.ui.tools.set(content.tools);
+  #resume(opened: OpenedImage, { tools, view, ...list }: ContentOf<'segment'>): void {
+    this.#editing.resume(opened.volume, opened, list);
+    if (tools) this.ui.tools.set(tools);
     this.ui.data.setFact(MAP_FACT, text('segment.sessionMap'));
-    restoreView(content.view, (shown) => {
-      this.ui.options.set(shown.options as Partial<SegmentViewOptions>);
-      this.ui.view.pose = shown as unknown as SegmentView['pose'];
-    });
+    if (!view) return;
+    this.ui.options.set(view.options);
+    this.ui.view.pose = view;
   }
 
   protected override async sessionContent(): Promise<Record<string, unknown>> {

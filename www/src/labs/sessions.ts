@@ -6,7 +6,6 @@ import { text } from '../texts';
 import { readFiles } from '../ui/files';
 import type { ErrorBanner, StatusLine } from '../ui/status';
 import type { WarningList } from '../ui/warnings';
-import { warningsIn } from '../warnings';
 import type { LAB_IDS } from './address';
 import type { LabStates } from './lab-states';
 import type { Handoff, OpenInLab } from './labs';
@@ -54,7 +53,10 @@ export class Sessions {
     const { states, opening } = this.#lab;
     if (!(await this.#lab.mayReplace())) return;
     try {
-      if (file && files.length === 1 && (await isSession(file))) await this.#read(file);
+      const isOne = file && files.length === 1 && (await isSession(file));
+      // Another session takes the place of the one that waits for its data, even if it is damaged.
+      if (isOne) this.#waiting = undefined;
+      if (isOne) await this.#read(file);
       else if (this.#waiting) await this.#complete(this.#waiting, files);
       else await opening.files(files);
     } catch (error) {
@@ -64,7 +66,14 @@ export class Sessions {
 
   /** Opens a session that another lab passes on; returns undefined if it passes on something else. */
   passedOn({ session }: Handoff): Promise<void> | undefined {
-    return session && this.#open(session);
+    const { states, opening } = this.#lab;
+    return (
+      session &&
+      this.#open(session).catch(async (error) => {
+        if (!opening.source) await opening.default();
+        states.fail(text('labs.openFailed', { name: session.source.name }), error);
+      })
+    );
   }
 
   /** Forgets the session that waits for its data, if one does. */
@@ -124,10 +133,9 @@ export class Sessions {
     const { opening, ui, states } = this.#lab;
     if (await anyForeign(files)) throw new Error(text('sessions.foreign'));
     await opening.session(session, files);
-    const { edits, undone = [], warnings } = session.content;
+    const { edits, undone, warnings } = session.content;
     if (opening.source?.session !== session) return;
-    ui.warnings.restore(warningsIn(warnings));
-    if (!Array.isArray(edits) || !Array.isArray(undone)) return;
+    ui.warnings.restore(warnings);
     await ui.finish?.repeat(edits, undone).catch((error) => states.fail(text('sessions.editsFailed'), error));
   }
 

@@ -4,7 +4,8 @@ import { IMAGES, OWN_PREPARATION, type TrackExample } from '../track/examples';
 import { viewOf } from '../track/presets';
 import type { Box, Enrichment, Preparation, Setup } from '../track/protocol';
 import type { TrackViewOptions } from '../view/track';
-import { differing, readValue } from './link';
+import { differing } from './link';
+import { listOf, paramsIn, queryOf, readValue, textsIn } from './link-query';
 
 const ADDRESS = '#track';
 
@@ -82,20 +83,19 @@ export function toHash({ example, file, params, preparation, box, at, view }: Li
  * parsed are ignored; whether parameters and view options are valid is not checked here.
  */
 export function fromHash(hash: string): LinkedTrack | undefined {
-  const [address = '', text] = hash.split(/\?(.*)/s);
-  if (address !== ADDRESS || !text) return undefined;
-  const query = new URLSearchParams(text);
-  const linked: LinkedTrack = { params: {}, preparation: preparationOf(query), view: viewIn(query) };
-  for (const name of ['example', 'file'] as const) {
-    const value = query.get(name);
-    if (value) linked[name] = value;
-  }
-  const [box, at] = [numbersOf(query.get('box'), 6), numbersOf(query.get('at'), 3)];
+  const query = queryOf(hash, ADDRESS);
+  if (!query) return undefined;
+  const linked: LinkedTrack = {
+    ...textsIn(query, ['example', 'file']),
+    params: paramsIn(query, paramOf),
+    preparation: preparationOf(query),
+    view: viewIn(query),
+  };
+  const [box, at] = [listOf(query.get('box') ?? '', 6), listOf(query.get('at') ?? '', 3)];
   if (box) linked.box = { min: box.slice(0, 3) as Vec3, max: box.slice(3) as Vec3 };
   else if (query.get('box') === 'whole') linked.box = 'whole';
   if (at) linked.at = at as Vec3;
   else if (query.get('at') === 'largest') linked.at = 'largest';
-  for (const [name, value] of query) if (name.startsWith('p.')) linked.params[name.slice(2)] = paramOf(value);
   return linked;
 }
 
@@ -116,14 +116,9 @@ function preparationOf(query: URLSearchParams): Partial<Preparation> {
 function viewIn(query: URLSearchParams): Partial<TrackViewOptions> {
   const view: Partial<TrackViewOptions> = {};
   for (const name of SWITCHES) if (query.has(name)) view[name] = query.get(name) === 'true';
-  const [votes, slices, below] = ['votes', 'slices', 'below'].map((name) => query.get(name));
+  const { votes, slices, below } = textsIn(query, ['votes', 'slices', 'below']);
   if (votes) view.votes = votes as TrackViewOptions['votes'];
   if (slices) view.slices = slices as TrackViewOptions['slices'];
   if (below) view.below = below as TrackViewOptions['below'];
   return view;
-}
-
-function numbersOf(text: string | null, length: number): number[] | undefined {
-  const list = (text ?? '').split(',').map(Number);
-  return text && list.length === length && list.every(Number.isFinite) ? list : undefined;
 }

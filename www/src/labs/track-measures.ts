@@ -1,3 +1,4 @@
+import { csvOf } from '../csv';
 import type { Unit } from '../examples';
 import { text } from '../texts';
 import { beatOf } from '../track/curve';
@@ -124,5 +125,5 @@ export function framesCsv(
     ...(known ? [error?.mean ?? '', error?.p95 ?? '', truth?.[i] ?? ''] : []),
     ...(warnings.length > 0 ? [cellOf(concerning(warnings, { frame: i }))] : []),
   ]);
-  return `${[head, ...lines].map((line) => line.join(',')).join('\n')}\n`;
+  return csvOf([head, ...lines]);
 }

@@ -1,5 +1,6 @@
 import { exampleUrl } from '../examples';
 import type { Moments } from '../session/moments';
+import { contentOf } from '../session/recognise';
 import type { TrackClient } from '../track/client';
 import { IMAGES, type TrackExample } from '../track/examples';
 import { imageById } from '../track/presets';
@@ -59,7 +60,7 @@ export class TrackOpening extends Opening<TrackExample, LinkedTrack, ImageSource
   }
 
   protected async load({ name, example, linked, session }: TrackSource, source: ImageSource): Promise<OpenedTrack> {
-    const moments = session && (await import('./track-session')).unpackTrack(session.content);
+    const moments = session && (await import('./track-session')).unpackTrack(contentOf(session, 'track'));
     const saved = moments?.now.saved;
     const setup = saved?.setup ?? setupOf(example, linked);
     return { ...(await this.#client.request('open', { name, source, setup, saved })), setup, moments };

@@ -1,6 +1,6 @@
 /** The Track lab's own part of a session. */
 import { type Moments, mapMoments, packMoments, unpackMoments } from '../session/moments';
-import { isLog, isRecord } from '../session/recognise';
+import type { ContentOf } from '../session/schema';
 import type { TrackedFrame } from '../track/protocol';
 import type { TrackMoment } from './track-settings';
 
@@ -18,20 +18,9 @@ export function packTrack(moments: Moments<TrackMoment>): Record<string, unknown
   return { ...packMoments(mapMoments(moments, flat)), frames };
 }
 
-/** Returns the saved states in the content of a session; throws an Error if they are damaged. */
-export function unpackTrack(content: Record<string, unknown>): Moments<TrackMoment> {
-  const all = Array.isArray(content.frames) ? (content.frames as TrackedFrame[]) : [];
-  type Flat = {
-    saved: TrackMoment['saved'];
-    page: Omit<TrackMoment['page']['record'], 'frames'> & { frames: number[] };
-  };
-  const isMoment = ({ setup, done, log }: Record<string, unknown>, { frames }: Record<string, unknown>) =>
-    isRecord(setup) &&
-    isLog(log) &&
-    typeof done === 'boolean' &&
-    Array.isArray(frames) &&
-    frames.every((index) => all[index]);
-  return mapMoments(unpackMoments<Flat>(content, isMoment), ({ saved, page: { frames, ...page } }) => ({
+/** Returns the saved states in the content of a session. */
+export function unpackTrack({ frames: all, ...content }: ContentOf<'track'>): Moments<TrackMoment> {
+  return mapMoments(unpackMoments(content), ({ saved, page: { frames, ...page } }) => ({
     saved,
     page: { record: { ...page, frames: frames.flatMap((index) => all[index] ?? []) } },
   }));

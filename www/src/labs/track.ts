@@ -1,6 +1,7 @@
 import { toFailure } from '../channel';
 import type { Moments } from '../session/moments';
-import { restoreView } from '../session/recognise';
+import { contentOf } from '../session/recognise';
+import type { ContentOf } from '../session/schema';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
@@ -11,8 +12,6 @@ import type { Alternative, StepEvent, VolumeView, WorkerEvent } from '../track/p
 import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
 import { invert, sliceOrientations } from '../view/anatomy';
-import type { StageView } from '../view/stage';
-import type { TrackViewOptions } from '../view/track';
 import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { OpenInLab } from './labs';
@@ -111,7 +110,7 @@ export class TrackLab extends RunLab<TrackExample> {
     this.#takeVolume(opened.volume, false);
     this.#settings.adopt(setup, { ...opened, volume: undefined });
     this.#results.startOver();
-    if (moments) return this.#resume(moments, session?.content.view);
+    if (moments) return this.#resume(moments, session && contentOf(session, 'track').view);
     this.ui.options.set({ ...viewOf(example), ...linked?.view });
     if (setup.box && this.#region) this.ui.view.fitRegion(this.#region);
     const crosshair = (setup.at === example?.at && example?.crosshair) || setup.at;
@@ -120,15 +119,14 @@ export class TrackLab extends RunLab<TrackExample> {
   }
 
   /** Continues a session: shows its state and view, and does not run it. */
-  async #resume(moments: Moments<TrackMoment>, view: unknown): Promise<void> {
+  async #resume(moments: Moments<TrackMoment>, view: ContentOf<'track'>['view']): Promise<void> {
     await this.#settings.resume(moments);
     const state = moments.now.saved.done ? 'done' : 'paused';
     this.states.idle(this.#results.describe(state), state);
-    restoreView(view, (shown) => {
-      this.ui.options.set(shown.options as Partial<TrackViewOptions>);
-      this.ui.view.pose = shown as unknown as StageView;
-      if (typeof shown.frame === 'number') this.#results.choose(shown.frame);
-    });
+    if (!view) return;
+    this.ui.options.set(view.options);
+    this.ui.view.pose = view;
+    if (view.frame !== undefined) this.#results.choose(view.frame);
   }
 
   protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {

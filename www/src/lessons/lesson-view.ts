@@ -24,6 +24,8 @@ export class LessonView {
   readonly #lesson: Lesson;
   readonly #lab: HTMLElement;
   #progress: Progress;
+  /** Says that the progress is not kept. */
+  readonly #notKept = h('p', { class: 'field-error', role: 'alert' });
   readonly #steps = h('ol', { class: 'lesson-steps' });
   readonly #body = h('div', { class: 'lesson-step' });
   readonly #news = h('p', { class: 'visually-hidden', role: 'status' });
@@ -40,7 +42,7 @@ export class LessonView {
     this.#lab = lab;
     this.#progress = loadProgress(lesson.id);
     const steps = h('nav', { 'aria-label': text('lessons.steps') }, this.#steps);
-    this.element = h('div', {}, steps, this.#body, this.#finished, this.#news, this.#results(address));
+    this.element = h('div', {}, steps, this.#notKept, this.#body, this.#finished, this.#news, this.#results(address));
     watchLab(lab, this.#closing.signal, () => this.#test());
     this.#show();
   }
@@ -62,7 +64,8 @@ export class LessonView {
   }
 
   #save(): void {
-    saveProgress(this.#lesson.id, this.#progress);
+    const isKept = saveProgress(this.#lesson.id, this.#progress);
+    this.#notKept.textContent = isKept ? '' : text('lessons.notKept');
     this.#showSteps();
   }
 

@@ -1,6 +1,7 @@
 /** A lesson: `lesson.json` and its text in Markdown, as docs/lessons.md describes them to authors. */
 import { labOf } from '../labs/address';
 import { text } from '../texts';
+import { checkData, checkSteps, checkText } from './bounds';
 import { type Check, checkProblem, type Operand, operandProblem } from './check';
 
 /** Headings within a step, in the order in which they are shown; `answer` is for teachers only. */
@@ -53,6 +54,7 @@ export function parseLesson(files: LessonFiles, language: string): Lesson {
   const used = chosenLanguage(data.languages, language);
   const source = files[textFile(used)];
   if (source === undefined) throw new Error(text('lessons.noText', { file: textFile(used) }));
+  checkText(textFile(used), source);
   const { title, intro, steps } = parseText(source);
   if (steps.length !== data.steps.length)
     throw new Error(
@@ -87,11 +89,13 @@ interface LessonData {
 
 function parseData(source: string | undefined): LessonData {
   if (source === undefined) throw new Error(text('lessons.noData', { file: DATA }));
+  checkData(DATA, source);
   const { id, languages, minutes, steps } = parseJson(source);
   const strings = Array.isArray(languages) && languages.length > 0 && languages.every((one) => typeof one === 'string');
   if (typeof id !== 'string' || !/^[\w-]+$/.test(id)) throw new Error(text('lessons.idInvalid', { file: DATA }));
   if (!strings) throw new Error(text('lessons.languagesInvalid', { file: DATA }));
   if (!Array.isArray(steps) || steps.length === 0) throw new Error(text('lessons.stepsInvalid', { file: DATA }));
+  checkSteps(DATA, steps.length);
   const before: string[] = [];
   for (const step of steps) {
     const problem = stepProblem(step ?? {}, before);

@@ -34,12 +34,16 @@ export function loadProgress(id: string): Progress {
   }
 }
 
-/** Keeps the progress in a lesson; without permission to store anything, it lasts as long as the page. */
-export function saveProgress(id: string, progress: Progress): void {
+/**
+ * Keeps the progress in a lesson; returns whether the browser does. If its storage is full, or not permitted, the progress
+ * lasts as long as the page.
+ */
+export function saveProgress(id: string, progress: Progress): boolean {
   try {
     localStorage.setItem(key(id), JSON.stringify(progress));
+    return true;
   } catch {
-    // Storage is full or not permitted.
+    return false;
   }
 }
 

@@ -33,12 +33,24 @@ const PALETTE = [
   '#7fd6cf',
 ];
 
+/** Most characters of a label's name. */
+const MOST_NAME = 200;
+
+/** Returns a name of a file as one line of bounded length, without marks that turn the direction of writing. */
+export function shortName(name: string): string {
+  return name
+    .slice(0, 2 * MOST_NAME)
+    .replace(/[\p{Cc}\u2028-\u202e\u2066-\u2069]+/gu, ' ')
+    .trim()
+    .slice(0, MOST_NAME);
+}
+
 /** Returns a label with the given value, with the name and colour that are known of it, or others by its value. */
 export function newLabel(value: number, { name, color }: Omit<KnownLabel, 'value'> = {}): Label {
   const index = (((value - 1) % PALETTE.length) + PALETTE.length) % PALETTE.length;
   return {
     value,
-    name: name ?? text('segment.labelName', { value }),
+    name: shortName(name ?? '') || text('segment.labelName', { value }),
     color: color ?? PALETTE[index] ?? '#888888',
   };
 }

@@ -34,8 +34,13 @@ export function count(value: number): string {
  * Throws an Error if the value of a placeholder is missing.
  */
 export function text(key: TextKey, values: TextValues = {}): string {
-  return template(key).replace(/\{(\w+)\}/g, (_, name: string) => String(requiredValue(values, name, key)));
+  return template(key).replace(/\{(\w+)\}/g, (_, name: string) => clipped(String(requiredValue(values, name, key))));
 }
+
+/** Most characters of what a text quotes: it may be from a file, and of any length. */
+const MOST_QUOTED = 1000;
+
+const clipped = (quoted: string) => (quoted.length > MOST_QUOTED ? `${quoted.slice(0, MOST_QUOTED)}…` : quoted);
 
 /**
  * Returns the plural form of a text that the language uses for this number, as "1 frame" or "2 frames"; the placeholder

@@ -1,0 +1,115 @@
+/** Lessons of anyone: a lesson within bounds, or an error in words. */
+import fc from 'fast-check';
+import { expect, test } from 'vitest';
+import { isTypeset } from '../../www/src/lessons/bounds';
+import { holds, unmetPart } from '../../www/src/lessons/check';
+import { filesOf, type LessonFiles, parseLesson } from '../../www/src/lessons/lesson';
+
+const numRuns = Number(process.env.PROPERTY_RUNS ?? 500);
+
+const READING = {
+  lab: 'extract',
+  state: 'done',
+  example: 'a',
+  params: {},
+  measures: { chi: 2 },
+  warnings: [],
+} as const;
+
+const name = fc.constantFrom(
+  ...['all', 'any', 'not', 'lab', 'state', 'example', 'measure', 'param', 'equals', 'above', 'within', 'step', 'times'],
+  ...['__proto__', 'constructor', 'toString'],
+);
+const { check } = fc.letrec((tie) => ({
+  check: fc.oneof(
+    { maxDepth: 6 },
+    fc.jsonValue(),
+    fc.record({ measure: fc.constantFrom('chi', 'x'), equals: tie('operand') }),
+    fc.dictionary(name, fc.oneof(fc.jsonValue(), fc.array(tie('check')), tie('check'))),
+    fc.record({ all: fc.array(tie('check')) }),
+    fc.record({ not: tie('check') }),
+  ),
+  operand: fc.oneof(fc.jsonValue(), fc.record({ step: fc.constantFrom('a', 'b'), measure: fc.constant('chi') })),
+}));
+const step = fc.oneof(
+  fc.jsonValue(),
+  fc.record(
+    { id: fc.constantFrom('a', 'b', 'c'), open: fc.constantFrom('extract', 'x', 'sculpt?p=1'), check, question: check },
+    { requiredKeys: ['id'] },
+  ),
+);
+const data = fc.oneof(
+  fc.string(),
+  fc.jsonValue().map((value) => JSON.stringify(value)),
+  fc
+    .record({ id: fc.constant('own'), languages: fc.constant(['en']), minutes: fc.anything(), steps: fc.array(step) })
+    .map((value) => JSON.stringify(value)),
+  fc.integer({ min: 0, max: 3000 }).map((depth) => `{"steps":${'['.repeat(depth)}${']'.repeat(depth)}}`),
+);
+const line = fc.constantFrom(
+  ...['# Title', '## Step', '### do', '### watch', '### other', '$x^2$', '$$', '$', '> '.repeat(40), '- '.repeat(40)],
+  ...[
+    '|a|b|\n|-|-|',
+    '[x](javascript:alert(1))',
+    '<script>',
+    '$\\def\\a{x}\\a$',
+    '`'.repeat(30),
+    '\\'.repeat(9),
+    'words',
+  ],
+);
+const text = fc.oneof(
+  fc.string(),
+  fc.array(line, { maxLength: 30 }).map((lines) => lines.join('\n')),
+);
+
+/** Returns a lesson; undefined if an error says what is wrong. */
+function read(files: LessonFiles) {
+  try {
+    const [first = ''] = filesOf(files['lesson.json'] ?? '', 'en');
+    expect(first).toBe('lesson.json');
+    return parseLesson(files, 'en');
+  } catch (error) {
+    // What a programming error throws is none in words.
+    expect((error as Error).constructor).toBe(Error);
+    expect((error as Error).message.length).toBeLessThan(2500);
+    return undefined;
+  }
+}
+
+test('any files are a lesson, or refused in words', () => {
+  fc.assert(
+    fc.property(data, text, (data, text) => {
+      const lesson = read({ 'lesson.json': data, 'text.en.md': text });
+      for (const { check } of lesson?.steps ?? []) {
+        if (!check) continue;
+        expect(holds(check, READING, {})).toBeTypeOf('boolean');
+        expect(unmetPart(check, READING, {}) === undefined).toBe(holds(check, READING, {}));
+      }
+    }),
+    { numRuns },
+  );
+});
+
+const whole = (text: string, steps = [{ id: 'a' }]) =>
+  parseLesson({ 'lesson.json': JSON.stringify({ id: 'own', languages: ['en'], steps }), 'text.en.md': text }, 'en');
+
+test('what would keep the page busy is refused', () => {
+  expect(whole(`# T\n\n## S\n${'$x$ '.repeat(600)}`).steps).toHaveLength(1);
+  expect(() => whole(`# T\n\n## S\n${'$x$ '.repeat(15_000)}`)).toThrow('at most 600 formulas');
+  expect(() => whole(`# T\n\n## S\n$$${'x'.repeat(2000)}$$`)).toThrow('characters in a formula');
+  expect(() => whole('# T\n\n## S\n'.padEnd(250_000))).toThrow('at most 200000 characters');
+  const ids = Array.from({ length: 101 }, (_, k) => ({ id: `s${k}` }));
+  expect(() => whole('# T', ids)).toThrow('at most 100 steps');
+  const nested = `{"id":"a","languages":["en"],"steps":${'['.repeat(99_000)}${']'.repeat(99_000)}}`;
+  expect(() => parseLesson({ 'lesson.json': nested }, 'en')).toThrow('within each other');
+  // A kilobyte of this takes KaTeX minutes.
+  expect(isTypeset(`\\def\\a{${'x'.repeat(500)}}${'\\a'.repeat(200)}`)).toBe(false);
+  expect(['\\chi = 2c - 2g', '\\left(x\\right)', '\\define x', '\\lets'].map(isTypeset)).toEqual([
+    true,
+    true,
+    true,
+    true,
+  ]);
+  expect(['\\newcommand{\\a}{x}', '\\gdef\\a{x}', '\\let\\a=b'].map(isTypeset)).toEqual([false, false, false]);
+});

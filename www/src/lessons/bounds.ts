@@ -1,0 +1,62 @@
+/** Bounds of a lesson, which may come from anywhere: one beyond them would keep the page busy. */
+import { text } from '../texts';
+
+/** Most characters of `lesson.json`, and of a text. */
+const MOST_CHARACTERS = 200_000;
+/** Most steps. */
+const MOST_STEPS = 100;
+/** How deep conditions may be nested, as brackets in `lesson.json`. */
+const MOST_NESTED = 40;
+/** Most formulas of a text, characters of one, and of all together. */
+const MOST_FORMULAS = 600;
+const MOST_OF_FORMULA = 1_000;
+const MOST_OF_FORMULAS = 40_000;
+
+/** Formulas that define commands: a line of them can stand for megabytes. */
+const DEFINITION = /\\(?:[egx]?def|(?:future)?let|(?:re|provide)?newcommand|providecommand|renewcommand|global|long)\b/;
+
+/** A formula between one or two dollar signs. */
+export const FORMULA = /\$\$([^$]+)\$\$|\$((?:[^$\\\n]|\\.)+)\$/;
+
+/** Throws an Error if the text of a file is too long, or its brackets are nested too deep. */
+export function checkData(file: string, source: string): void {
+  checkLength(file, source);
+  if (nesting(source) > MOST_NESTED) throw tooMuch(file, text('lessons.nested'), MOST_NESTED);
+}
+
+/** Throws an Error if there are too many steps. */
+export function checkSteps(file: string, steps: number): void {
+  if (steps > MOST_STEPS) throw tooMuch(file, text('lessons.stepCount'), MOST_STEPS);
+}
+
+/** Throws an Error if a text is too long, or has too many formulas, or too long ones. */
+export function checkText(file: string, source: string): void {
+  checkLength(file, source);
+  let [count, length] = [0, 0];
+  for (const [formula] of source.matchAll(new RegExp(FORMULA, 'g'))) {
+    count += 1;
+    length += formula.length;
+    if (formula.length > MOST_OF_FORMULA) throw tooMuch(file, text('lessons.formulaCharacters'), MOST_OF_FORMULA);
+  }
+  if (count > MOST_FORMULAS) throw tooMuch(file, text('lessons.formulas'), MOST_FORMULAS);
+  if (length > MOST_OF_FORMULAS) throw tooMuch(file, text('lessons.formulasCharacters'), MOST_OF_FORMULAS);
+}
+
+/** Returns whether a formula is typeset; others are shown as their source. */
+export const isTypeset = (formula: string): boolean => formula.length <= MOST_OF_FORMULA && !DEFINITION.test(formula);
+
+function checkLength(file: string, source: string): void {
+  if (source.length > MOST_CHARACTERS) throw tooMuch(file, text('lessons.characters'), MOST_CHARACTERS);
+}
+
+const tooMuch = (file: string, what: string, most: number) => new Error(text('lessons.tooMuch', { file, what, most }));
+
+/** Returns how deep brackets are nested in JSON, or more. */
+function nesting(json: string): number {
+  let [depth, deepest] = [0, 0];
+  for (const character of json) {
+    if (character === '[' || character === '{') deepest = Math.max(deepest, ++depth);
+    if (character === ']' || character === '}') depth -= 1;
+  }
+  return deepest;
+}
