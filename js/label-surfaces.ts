@@ -3,8 +3,16 @@ import type { Vec3 } from './data.js';
 import { type Mesh, wrapMesh } from './mesh.js';
 import { frameOf, type MeshFrame } from './mesh-file.js';
 import { Handle } from './runtime.js';
-import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
-import { RawLabelSurfaces } from './vesicle.js';
+import {
+  checkedSlices,
+  Runner,
+  type RunOptions,
+  runInSlices,
+  type SliceOptions,
+  type Stepper,
+  type StepReport,
+} from './stepper.js';
+import { RawLabelCreation, RawLabelSurfaces } from './vesicle.js';
 import { checkedRegion, type Volume, volumeHandle } from './volume.js';
 import { ModelWarnings } from './warnings.js';
 
@@ -34,6 +42,25 @@ export interface LabelOptions extends LabelParams {
 
 const OPTIONS = ['volume', 'labels', 'smoothing', 'edge'];
 
+/** Surfaces that are created already, for the constructor. */
+class Created {
+  readonly volume: Volume;
+  readonly handle: Handle<RawLabelSurfaces>;
+
+  constructor(volume: Volume, handle: Handle<RawLabelSurfaces>) {
+    this.volume = volume;
+    this.handle = handle;
+  }
+}
+
+/** Returns the volume, and the arguments for the raw object of surfaces or of their creation. */
+function checked(given: LabelOptions) {
+  const { volume, labels, ...params } = checkProperties('options', given, OPTIONS) as LabelOptions;
+  const image = volumeHandle('volume', volume);
+  const wanted = labels && Float64Array.from(denseCopy('labels', labels), (label) => number('labels', label));
+  return { volume, image, wanted, params };
+}
+
 /**
  * Surfaces of a label map: one closed surface for each label, none of which intersects itself or another, and which
  * follow changes of the label map.
@@ -60,13 +87,31 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
    *   does not have, too many labels; `too-large`.
    */
   constructor(given: LabelOptions) {
-    const { volume, labels, ...params } = checkProperties('options', given, OPTIONS) as LabelOptions;
-    const image = volumeHandle('volume', volume);
-    const wanted = labels && Float64Array.from(denseCopy('labels', labels), (label) => number('labels', label));
+    const { volume, handle } = given instanceof Created ? given : create(given);
     this.#volume = volume;
     this.#frame = frameOf(volume);
     this.#warnings = new ModelWarnings(volume.warnings);
-    this.#handle = new Handle('LabelSurfaces', () => image.use((raw) => new RawLabelSurfaces(raw, wanted, params)));
+    this.#handle = handle;
+  }
+
+  /**
+   * Creates the surfaces as the constructor does, bit for bit, yielding to the event loop between slices of work: those of a
+   * large label map take seconds. The volume must not be freed before.
+   *
+   * @param options - `signal`: aborts the creation; `budgetMs`: duration of a slice, milliseconds, default 12.
+   * @throws As the constructor; `signal.reason` when aborted.
+   */
+  static async create(given: LabelOptions, options?: SliceOptions): Promise<LabelSurfaces> {
+    const { signal, budgetMs } = checkedSlices(options);
+    signal?.throwIfAborted();
+    const { volume, image, wanted, params } = checked(given);
+    const creation = new Handle('LabelSurfaces', () => image.use((raw) => new RawLabelCreation(raw, wanted, params)));
+    try {
+      const raw = await runInSlices(() => creation.use((one) => one.advance()), signal, budgetMs);
+      return new LabelSurfaces(new Created(volume, new Handle('LabelSurfaces', () => raw)) as unknown as LabelOptions);
+    } finally {
+      creation.free();
+    }
   }
 
   /** The labels that have voxels and a surface, in ascending order. */
@@ -124,15 +169,22 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
   }
 
   /**
-   * Runs until the surfaces are settled, yielding to the event loop between slices of work. {@link LabelSurfaces.refresh}
-   * may be called meanwhile.
+   * Runs until the surfaces are settled, yielding to the event loop between slices of work, also within a step.
+   * {@link LabelSurfaces.refresh} may be called meanwhile; like all that looks at the surfaces, it ends a step that is under
+   * way first.
    *
    * @returns The last report.
    * @throws `signal.reason` when aborted, and the surfaces stay usable; any error thrown by `onStep`;
    *   {@link VesicleError} `invalid-argument` while another run is in progress, `freed` when freed meanwhile.
    */
   run(given?: RunOptions): Promise<StepReport> {
-    return this.#runner.run(() => this.#step(1), given);
+    return this.#runner.run(() => this.#advance(), given);
+  }
+
+  /** Does a slice of a step; returns its report at its end. */
+  #advance(): StepReport | undefined {
+    const report = this.#handle.use((raw) => raw.advance() as StepReport | undefined);
+    return report && this.#warnings.take(report);
   }
 
   #step(iterations: number): StepReport {
@@ -178,4 +230,10 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
   [Symbol.dispose](): void {
     this.free();
   }
+}
+
+function create(given: LabelOptions): Created {
+  const { volume, image, wanted, params } = checked(given);
+  const make = () => image.use((raw) => new RawLabelSurfaces(raw, wanted, params));
+  return new Created(volume, new Handle('LabelSurfaces', make));
 }

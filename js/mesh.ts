@@ -110,6 +110,11 @@ export interface MeshReport {
    * Number of pairs of triangles that intersect beyond their common corners and edges, tested with exact predicates.
    */
   selfIntersections: number;
+  /**
+   * Present, and true, if there are more self-intersections than were counted: that ends at a million, or where so many
+   * triangles lie on each other that it would take minutes.
+   */
+  hasMore?: true;
 }
 
 /** Options of what returns positions in single precision, such as {@link Mesh.arrays}. */

@@ -65,6 +65,9 @@ export interface RunOptions {
   onStep?: (report: StepReport) => void;
 }
 
+/** Options of work in slices. */
+export type SliceOptions = Pick<RunOptions, 'signal' | 'budgetMs'>;
+
 /** Interface that the models of all four methods implement. */
 export interface Stepper {
   /** The model's surface: the same live {@link Mesh} from start to end, which shows the current state. */
@@ -168,12 +171,12 @@ export class Runner {
   }
 
   /**
-   * Calls `step` until the model is done, the run is aborted, or `maxIterations` is reached; returns the last report.
-   * See {@link RunOptions}. When `step` throws a {@link NeedsDataError}, the data are read, with `onData`, and the run
+   * Calls `step`, which returns undefined in the middle of a step, until the model is done, the run is aborted, or
+   * `maxIterations` is reached; returns the last report. See {@link RunOptions}. When `step` throws a {@link NeedsDataError}, the data are read, with `onData`, and the run
    * goes on.
    */
   async run(
-    step: () => StepReport,
+    step: () => StepReport | undefined,
     given: RunOptions | undefined,
     onData?: DataOptions['onData'],
   ): Promise<StepReport> {
@@ -184,6 +187,7 @@ export class Runner {
     let left = maxIterations;
     const next = () => {
       const report = step();
+      if (!report) return undefined;
       onStep?.(report);
       left -= 1;
       return report.done || left === 0 ? report : undefined;
@@ -208,6 +212,14 @@ export function checkedRun(given: RunOptions | undefined): RunOptions {
   checkSignal(run.signal);
   checkListener('onStep', run.onStep);
   return run;
+}
+
+/** Returns the options of work in slices once they are checked. */
+export function checkedSlices(given: SliceOptions | undefined): SliceOptions {
+  const options = checkProperties<SliceOptions>('options', given, ['signal', 'budgetMs']);
+  if (options.budgetMs !== undefined) positive('budgetMs', options.budgetMs);
+  checkSignal(options.signal);
+  return options;
 }
 
 /** Throws `invalid-argument` unless `signal` is an AbortSignal or undefined. */

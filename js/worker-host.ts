@@ -139,15 +139,17 @@ class Host {
     return { counts: (target as unknown as Mesh).copyTo(arrays, options), arrays };
   }
 
-  async #abortable(id: number, { on, name, args: [options], reports }: Call): Promise<unknown> {
+  async #abortable(id: number, { on, name, args, reports }: Call): Promise<unknown> {
     const { target } = this.#find(on, name);
+    const given = this.#incoming(args);
+    const options = given.pop() as object;
     const abort = new AbortController();
     this.#controllers.set(id, abort);
     const listener = (report: Report) => this.#post({ type: 'report', id, report }, []);
     const listeners = reports && { [ABORTABLE[name as keyof typeof ABORTABLE]]: listener };
     try {
-      const work = target[name] as (options: object) => Promise<unknown>;
-      return await work.call(target, { ...(options as object), signal: abort.signal, ...listeners });
+      const work = target[name] as (...args: unknown[]) => Promise<unknown>;
+      return await work.call(target, ...given, { ...options, signal: abort.signal, ...listeners });
     } finally {
       this.#controllers.delete(id);
     }

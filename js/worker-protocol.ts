@@ -36,8 +36,11 @@ export type Reply =
 /** Content of a report: the state after a step of a run, or the fraction done, 0..1, of a coverage measurement. */
 export type Report = StepReport | number;
 
-/** Methods that the page can abort, with the name of the listener option that receives their reports. */
-export const ABORTABLE = { run: 'onStep', coverage: 'onProgress' } as const;
+/**
+ * Methods that the page can abort, whose last argument is their options, with the name of the listener option that receives
+ * their reports; empty if they have none.
+ */
+export const ABORTABLE = { run: 'onStep', coverage: 'onProgress', create: '' } as const;
 
 /** An error of the worker, serialised so that the page can create an equal one. */
 export type Failure =
@@ -204,7 +207,7 @@ export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N
   ImplicitSurface: {},
   SurfaceTracker: {},
   MultiresolutionModel: {},
-  LabelSurfaces: {},
+  LabelSurfaces: { create: 'method' },
 };
 
 /** Free functions that the page may call in the worker. */

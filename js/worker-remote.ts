@@ -3,7 +3,7 @@ import { checkProperties, invalid } from './check.js';
 import { type CoverageOptions, checkedCoverage } from './coverage.js';
 import { VesicleError } from './error.js';
 import type { MeshArrays, PositionOptions } from './mesh.js';
-import { checkedRun, type RunOptions } from './stepper.js';
+import { checkedRun, checkedSlices, type RunOptions, type SliceOptions } from './stepper.js';
 import {
   type ABORTABLE,
   isPlain,
@@ -191,38 +191,41 @@ async function post(
 
 async function run(remote: Remote, given?: RunOptions): Promise<unknown> {
   const { signal, onStep, ...rest } = checkedRun(given);
-  return abortable(remote, 'run', rest, signal, onStep as Listener | undefined);
+  return abortable(remote, 'run', [rest], signal, onStep as Listener | undefined);
 }
 
 async function coverage(remote: Remote, given?: CoverageOptions): Promise<unknown> {
   const { signal, onProgress, ...rest } = checkedCoverage(given);
-  return abortable(remote, 'coverage', rest, signal, onProgress as Listener | undefined);
+  return abortable(remote, 'coverage', [rest], signal, onProgress as Listener | undefined);
 }
 
 type Listener = (report: Report) => void;
 
 /**
- * Calls an abortable method, `run` or `coverage`, in the worker. Signal and listener stay on the page: the signal posts
+ * Calls an abortable method of an object or a class in the worker. Signal and listener stay on the page: the signal posts
  * an abort message, the listener is called with the reports received.
  */
 async function abortable(
-  remote: Remote,
+  on: Remote | ClassName,
   name: keyof typeof ABORTABLE,
-  options: object,
+  args: readonly unknown[],
   signal: AbortSignal | undefined,
-  listener: Listener | undefined,
+  listener?: Listener,
 ): Promise<unknown> {
   signal?.throwIfAborted();
-  const session = sessionOf(remote);
+  const session = on instanceof Remote ? sessionOf(on) : currentSession();
   const stop = new AbortController();
   const onReport = listener && ((report: Report) => notify(listener, report, stop));
-  const task: Task = { type: 'call', on: referenceOf(remote), name, args: [options], reports: !!listener };
-  const { id, answer } = session.post(task, { target: remote, onReport });
+  const target = on instanceof Remote ? referenceOf(on) : on;
+  const sent = serialize(args);
+  const task: Task = { type: 'call', on: target, name, args: sent.args, reports: !!listener };
+  const { id, answer } = session.post(task, { ...sent, target: on, onReport });
   const abort = () => stop.abort(signal?.reason);
   signal?.addEventListener('abort', abort);
   stop.signal.addEventListener('abort', () => session.abort(id));
   try {
-    const result = await answer;
+    // An object that is not needed any more is freed with its proxy.
+    const result = deserialize(await answer, session);
     stop.signal.throwIfAborted();
     return result;
   } catch (error) {
@@ -294,7 +297,8 @@ function remoteClass(name: ClassName): Class {
   }
   for (const [member, kind] of Object.entries(MEMBERS[name])) define(proxy.prototype, member, memberOf(member, kind));
   // Meshes are created by static methods only.
-  if (name !== 'Mesh') define(proxy, 'create', { value: creator(proxy, name) });
+  const create = 'create' in STATICS[name] ? slicedCreator(name) : creator(proxy, name);
+  if (name !== 'Mesh') define(proxy, 'create', { value: create });
   return proxy;
 }
 
@@ -340,6 +344,14 @@ function creator(proxy: Class, name: ClassName): (...args: unknown[]) => Promise
     const object = new proxy(request.state);
     await request.created;
     return object;
+  };
+}
+
+/** Returns the static method that creates an object in slices, which can be aborted. */
+function slicedCreator(name: ClassName): (given: unknown, options?: SliceOptions) => Promise<unknown> {
+  return async (given, options) => {
+    const { signal, ...rest } = checkedSlices(options);
+    return abortable(name, 'create', [given, rest], signal);
   };
 }
 

@@ -57,11 +57,11 @@ struct Scene {
 impl Scene {
     fn choose(choices: &mut Choices) -> Self {
         let meshes = 1 + choices.below(3);
-        let most_nodes = if choices.chance(8) { 200 } else { 12 };
+        let most_nodes = if choices.chance(32) { 100 } else { 5 };
         Self {
-            primitives: (0..meshes).map(|_| choices.below(4)).collect(),
+            primitives: (0..meshes).map(|_| choices.below(3)).collect(),
             nodes: 1 + choices.below(most_nodes),
-            instances: if choices.chance(3) { choices.below(40) } else { 0 },
+            instances: if choices.chance(4) { choices.below(9) } else { 0 },
             targets: choices.below(3),
             skinned: choices.chance(4),
             corners: choices.below(16),

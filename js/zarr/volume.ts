@@ -2,6 +2,7 @@ import { endingTogether } from '../abort.js';
 import { checkProperties, invalid, numbers, shallowCopy } from '../check.js';
 import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
+import { type Pause, withPause } from '../pause.js';
 import { Handle } from '../runtime.js';
 import { SPARSE_SOURCE, type SparseSource } from '../sparse.js';
 import { checkSignal } from '../stepper.js';
@@ -178,11 +179,15 @@ export class ZarrVolume {
   ): Promise<void> {
     const chunks = chunksOf(target, level.info.chunks);
     await endingTogether(signal, (signal) => {
-      const take = async () => {
+      const take = async (pause: Pause) => {
         // All take from the same iterator.
-        for (const chunk of chunks) copyOverlap(await this.#brick(index, level, chunk, signal), target.data, target);
+        for (const chunk of chunks) {
+          copyOverlap(await this.#brick(index, level, chunk, signal), target.data, target);
+          // Those that are not stored need no request that would let other things happen.
+          await pause.turn();
+        }
       };
-      return Promise.all(Array.from({ length: this.#concurrency }, take));
+      return Promise.all(Array.from({ length: this.#concurrency }, () => withPause(signal, take)));
     });
   }
 

@@ -500,6 +500,13 @@ struct Report {
     non_manifold_vertices: usize,
     degenerate_triangles: usize,
     self_intersections: usize,
+    #[serde(skip_serializing_if = "is_false")]
+    has_more: bool,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_false(value: &bool) -> bool {
+    !value
 }
 
 impl From<MeshReport> for Report {
@@ -511,6 +518,7 @@ impl From<MeshReport> for Report {
             non_manifold_vertices: report.non_manifold_vertices,
             degenerate_triangles: report.degenerate_triangles,
             self_intersections: report.self_intersections,
+            has_more: report.has_more,
         }
     }
 }

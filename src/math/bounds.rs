@@ -3,6 +3,7 @@
 use super::order::{combined_rank, rank_f32, select_least};
 use super::{DVec3, Vec3};
 use smallvec::SmallVec;
+use std::cell::Cell;
 use std::ops::Range;
 
 /// An axis-aligned bounding box; its faces belong to it.
@@ -189,13 +190,19 @@ impl BoxTree {
     }
 
     /// Calls `visit` once with each pair of items (indices of boxes) whose boxes overlap, the lower index first. The
-    /// order of the pairs is deterministic but arbitrary.
-    pub fn for_each_pair(&self, mut visit: impl FnMut(u32, u32)) {
+    /// order of the pairs is deterministic but arbitrary. It stops soon after `visit` returns false.
+    pub fn for_each_pair(&self, mut visit: impl FnMut(u32, u32) -> bool) {
+        let goes_on = Cell::new(true);
+        let mut visit = |a, b| {
+            if goes_on.get() {
+                goes_on.set(visit(a, b));
+            }
+        };
         let mut stack = Vec::new();
         if !self.nodes.is_empty() {
             stack.push((0, 0));
         }
-        while let Some((i, j)) = stack.pop() {
+        while let Some((i, j)) = stack.pop().filter(|_| goes_on.get()) {
             let (a, b) = (&self.nodes[i], &self.nodes[j]);
             match (a.count > 0, b.count > 0) {
                 _ if !a.bounds.overlaps(&b.bounds) => {}
@@ -419,7 +426,10 @@ mod tests {
         for count in [0, 1, 2, 5, 9, 300] {
             let boxes = boxes(count);
             let mut found = Vec::new();
-            BoxTree::new(&boxes).for_each_pair(|i, j| found.push((i, j)));
+            BoxTree::new(&boxes).for_each_pair(|i, j| {
+                found.push((i, j));
+                true
+            });
             found.sort_unstable();
             let all = (0..count).flat_map(|j| (0..j).map(move |i| (i, j)));
             let mut expected: Vec<_> =

@@ -2,7 +2,7 @@
 
 use super::disjoint_sets::DisjointSets;
 use super::edge_table::{HalfEdge, by_edge, sorted_half_edges};
-use super::self_intersections::count_self_intersections;
+use super::self_intersections::count_in_time;
 use super::{MeshError, TriangleMesh};
 use crate::math::order::{combined_rank, sort_by_rank, sort_pairs};
 use crate::math::predicates::collinear;
@@ -25,6 +25,9 @@ pub struct MeshReport {
     /// The number of pairs of triangles that intersect beyond their common corners and edges, tested exactly; see
     /// [`intersecting_pairs`](super::intersecting_pairs).
     pub self_intersections: usize,
+    /// Whether there are more self-intersections than were counted: that ends at a million, or where so many triangles lie
+    /// on each other that it would take minutes.
+    pub has_more: bool,
 }
 
 impl MeshReport {
@@ -36,6 +39,7 @@ impl MeshReport {
             && self.non_manifold_vertices == 0
             && self.degenerate_triangles == 0
             && self.self_intersections == 0
+            && !self.has_more
     }
 }
 
@@ -47,13 +51,15 @@ impl MeshReport {
 pub fn report(mesh: &TriangleMesh) -> Result<MeshReport, MeshError> {
     mesh.validate()?;
     let uses = sorted_half_edges(&mesh.triangles);
+    let intersections = count_in_time(mesh);
     Ok(MeshReport {
         closed: is_closed(&uses),
         oriented: is_oriented(&uses),
         non_manifold_edges: non_manifold_edges(&uses),
         non_manifold_vertices: non_manifold_vertices(mesh),
         degenerate_triangles: degenerate_triangles(mesh),
-        self_intersections: count_self_intersections(mesh),
+        self_intersections: intersections.found,
+        has_more: !intersections.is_complete,
     })
 }
 
@@ -299,5 +305,19 @@ mod tests {
         let intersecting = intersecting_pairs(&mesh);
         assert!(!intersecting.is_empty() && intersecting.len() < 1000, "{}", intersecting.len());
         assert!(intersecting.iter().all(|pair| pair[1] == mesh.triangles.len() as u32 - 1));
+    }
+
+    #[test]
+    fn counting_intersections_ends_where_all_triangles_lie_on_each_other() {
+        let count = 3000;
+        let mut mesh = corner_tetrahedron();
+        mesh.triangles = (0..count).map(|k| mesh.triangles[k % 4]).collect();
+        let found = report(&mesh).unwrap();
+        assert!(found.has_more && !found.is_healthy());
+        assert_eq!(found.self_intersections, 1_000_000);
+        // As many pairs as below the bound are all counted: those of the same triangle, and none of two different ones.
+        mesh.triangles.truncate(400);
+        let found = report(&mesh).unwrap();
+        assert_eq!((found.self_intersections, found.has_more), (4 * 100 * 99 / 2, false));
     }
 }

@@ -16,7 +16,12 @@ use crate::math::{Bounds, BoxTree, Vec3};
 /// [`count_self_intersections`] only counts.
 pub fn intersecting_pairs(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     let mut pairs = Vec::new();
-    for_each_intersecting_pair(mesh, |s, t| pairs.push(combined_rank(s, t)));
+    for_each_tested_pair(mesh, |s, t, intersect| {
+        if intersect {
+            pairs.push(combined_rank(s, t));
+        }
+        true
+    });
     sort_ranks(&mut pairs);
     pairs.into_iter().map(|pair| [(pair >> 32) as u32, pair as u32]).collect()
 }
@@ -27,11 +32,45 @@ pub fn intersecting_pairs(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
 /// if all do.
 pub fn count_self_intersections(mesh: &TriangleMesh) -> usize {
     let mut count = 0;
-    for_each_intersecting_pair(mesh, |_, _| count += 1);
+    for_each_tested_pair(mesh, |_, _, intersect| {
+        count += usize::from(intersect);
+        true
+    });
     count
 }
 
-fn for_each_intersecting_pair(mesh: &TriangleMesh, mut visit: impl FnMut(u32, u32)) {
+/// Number of self-intersections after which [`count_in_time`] stops.
+const MOST_FOUND: usize = 1_000_000;
+
+/// Number of pairs of triangles, and of pairs for each triangle, after which [`count_in_time`] stops: meshes have some
+/// twenty pairs a triangle whose boxes overlap.
+const MOST_TESTED: [usize; 2] = [3_000_000, 60];
+
+/// The number of self-intersections of a mesh, as far as they were counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct CountInTime {
+    pub found: usize,
+    /// Whether all were counted.
+    pub is_complete: bool,
+}
+
+/// Counts self-intersections as [`count_self_intersections`] does, but stops where so many triangles lie on each other that
+/// time would be quadratic.
+pub(super) fn count_in_time(mesh: &TriangleMesh) -> CountInTime {
+    let most = MOST_TESTED[0].max(MOST_TESTED[1].saturating_mul(mesh.triangles.len()));
+    let mut count = CountInTime { found: 0, is_complete: true };
+    let mut tested = 0;
+    for_each_tested_pair(mesh, |_, _, intersect| {
+        tested += 1;
+        count.found += usize::from(intersect);
+        count.is_complete = tested < most && count.found < MOST_FOUND;
+        count.is_complete
+    });
+    count
+}
+
+/// Calls `visit` with each pair of triangles whose boxes overlap, and whether they intersect, until it returns false.
+fn for_each_tested_pair(mesh: &TriangleMesh, mut visit: impl FnMut(u32, u32, bool) -> bool) {
     let (valid, boxes): (Vec<u32>, Vec<Bounds>) = (0..)
         .zip(&mesh.triangles)
         .filter_map(|(t, triangle)| {
@@ -40,9 +79,7 @@ fn for_each_intersecting_pair(mesh: &TriangleMesh, mut visit: impl FnMut(u32, u3
         .unzip();
     BoxTree::new(&boxes).for_each_pair(|i, j| {
         let (s, t) = (valid[i as usize], valid[j as usize]);
-        if facets_intersect(&facet(mesh, s), &facet(mesh, t)) {
-            visit(s, t);
-        }
+        visit(s, t, facets_intersect(&facet(mesh, s), &facet(mesh, t)))
     });
 }
 

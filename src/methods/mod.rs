@@ -9,6 +9,7 @@ mod method;
 pub mod multires;
 mod params;
 mod saved;
+pub mod slices;
 mod spec;
 mod step;
 pub mod tracking;

@@ -61,6 +61,19 @@ pub(crate) fn marching_cubes_of_slices<'a>(
     iso: f32,
     slice: &dyn Fn(usize) -> Cow<'a, [f32]>,
 ) -> Result<TriangleMesh, VolumeError> {
+    bounded_marching_cubes(dims, iso, usize::MAX, slice)
+}
+
+/// Extracts the iso-surface as [`marching_cubes_of_slices`], with about `most` triangles at most.
+///
+/// # Errors
+/// As there; [`VolumeError::TooLarge`] for more triangles.
+pub(crate) fn bounded_marching_cubes<'a>(
+    dims: [usize; 3],
+    iso: f32,
+    most: usize,
+    slice: &dyn Fn(usize) -> Cow<'a, [f32]>,
+) -> Result<TriangleMesh, VolumeError> {
     if !iso.is_finite() {
         return Err(VolumeError::invalid("iso", format!("must be finite, got {iso}")));
     }
@@ -68,6 +81,11 @@ pub(crate) fn marching_cubes_of_slices<'a>(
     for z in 0..=dims[2] {
         let next = if z < dims[2] { slice(z) } else { Cow::default() };
         marching.layer(z, next)?;
+        let triangles = marching.mesh.triangles.len();
+        if triangles > most {
+            // What is done with a surface takes ten times its memory.
+            return Err(VolumeError::TooLarge { bytes: 180 * triangles as u64 });
+        }
     }
     Ok(marching.mesh)
 }

@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 import { LabelSurfaces, Mesh, paramSpecs, type Vec3, Volume } from '../../pkg/index.js';
-import { ball, failure } from './helpers.js';
+import { ball, failure, rejection } from './helpers.js';
 
 const DIMS: Vec3 = [12, 10, 8];
 
@@ -163,4 +163,49 @@ test('longer edges give fewer triangles, and the same voxels, also after a chang
   }
   coarse.setParams({ edge: 1 });
   expect(coarse.mesh(1).arrays()).toEqual(fine.mesh(1).arrays());
+});
+
+/** A label map of noise, which is much work. */
+function noise(size: number): Volume {
+  let state = 7;
+  const data = Uint8Array.from({ length: size ** 3 }, () => {
+    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+    return state >>> 31;
+  });
+  return new Volume({ data, dims: [size, size, size] });
+}
+
+test('they can be created in slices, with the same bits, and not if that is aborted', async () => {
+  const volume = noise(16);
+  const whole = new LabelSurfaces({ volume });
+  const sliced = await LabelSurfaces.create({ volume }, { budgetMs: 0.1 });
+  expect(sliced).toBeInstanceOf(LabelSurfaces);
+  expect(sliced.save()).toEqual(whole.save());
+  const stop = new AbortController();
+  // Runs only if the creation lets it.
+  setTimeout(() => stop.abort(new Error('enough')));
+  const options = { signal: stop.signal, budgetMs: 0.1 };
+  await expect(LabelSurfaces.create({ volume }, options)).rejects.toThrow('enough');
+  await expect(LabelSurfaces.create({ volume }, options)).rejects.toThrow('enough');
+  const error = await rejection(LabelSurfaces.create({ volume, smoothing: -1 }));
+  expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining('smoothing')]);
+  expect((await rejection(LabelSurfaces.create({ volume }, { budget: 1 } as object))).message).toContain('budget');
+});
+
+test('a run that is aborted within a step leaves surfaces on which nothing is half done', async () => {
+  const volume = noise(16);
+  const [whole, sliced] = [new LabelSurfaces({ volume }), new LabelSurfaces({ volume })];
+  const reports: number[] = [];
+  const stop = new AbortController();
+  setTimeout(() => stop.abort(new Error('enough')));
+  const onStep = () => reports.push(1);
+  await expect(sliced.run({ signal: stop.signal, budgetMs: 0.1, onStep })).rejects.toThrow('enough');
+  expect(reports).toEqual([]);
+  // The step that was under way ends when someone looks.
+  whole.step();
+  expect(sliced.mesh(1).check()).toMatchObject({ closed: true, oriented: true, selfIntersections: 0 });
+  expect(sliced.save()).toEqual(whole.save());
+  expect((await sliced.run()).done).toBe(true);
+  await whole.run();
+  expect(sliced.save()).toEqual(whole.save());
 });

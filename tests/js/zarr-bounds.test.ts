@@ -179,3 +179,13 @@ describe('a server', () => {
     expect(server.log.length).toBeLessThanOrEqual(3);
   });
 });
+
+test('reading chunks that are not stored can be aborted', async () => {
+  const zarr = await openZarr(new TestStore(image({ shape: [200, 200, 200], chunks: [1, 1, 2] })));
+  const stop = new AbortController();
+  // Runs only if reading lets it.
+  setTimeout(() => stop.abort(new Error('enough')), 5);
+  await expect(zarr.region(0, { min: [0, 0, 0], max: [200, 200, 200] }, { signal: stop.signal })).rejects.toThrow(
+    'enough',
+  );
+});

@@ -8,8 +8,12 @@ use crate::math::{Bounds, Vec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::remesh::clustered;
-use crate::volume::{Padding, Subdivided, marching_cubes_of_slices, voxels_inside};
+use crate::volume::{Padding, Subdivided, bounded_marching_cubes, voxels_inside};
 use std::borrow::Cow;
+
+/// The largest number of triangles of a contour: a model of more would need more memory than a page has. Noise without
+/// an object has as many.
+const MOST_TRIANGLES: usize = 6_000_000;
 
 /// The least δ, in voxels of the pyramid level, for which a contour is simplified by merging clusters of vertices; for
 /// finer meshes, clusters as large as a voxel are too coarse.
@@ -135,8 +139,8 @@ pub(super) fn contour_of_grid(
 ) -> Result<TriangleMesh, MethodError> {
     let negated = |z: usize| Cow::Owned(grid.slice(z).iter().map(|value| -value).collect());
     Ok(match object {
-        ObjectIs::Brighter => marching_cubes_of_slices(grid.dims(), iso, &|z| grid.slice(z))?,
-        ObjectIs::Darker => marching_cubes_of_slices(grid.dims(), -iso, &negated)?,
+        ObjectIs::Brighter => bounded_marching_cubes(grid.dims(), iso, MOST_TRIANGLES, &|z| grid.slice(z))?,
+        ObjectIs::Darker => bounded_marching_cubes(grid.dims(), -iso, MOST_TRIANGLES, &negated)?,
     })
 }
 

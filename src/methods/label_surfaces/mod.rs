@@ -31,6 +31,7 @@ pub use params::LabelParams;
 use crate::math::{DAffine3, DVec3, box_corners};
 use crate::mesh::{TriangleMesh, grid_origin};
 use crate::methods::method::method;
+use crate::methods::slices::{Pauses, finished};
 use crate::methods::{LiveSurface, MethodError, Parameters, StepReport, Times};
 use crate::remesh::Changes;
 use crate::volume::{Region, Volume, listed};
@@ -121,10 +122,29 @@ impl LabelSurfaces {
     /// [`MethodError::InvalidArgument`] for a volume that is no label map, labels it does not have, or parameters out of
     /// range; an error about memory.
     pub fn new(volume: &Volume, labels: Option<Vec<f64>>, params: LabelParams) -> Result<Self, MethodError> {
+        finished(Self::begin(volume, labels, params)?)
+    }
+
+    /// Begins to create surfaces as [`Self::new`] does, in [slices](crate::methods::slices); the volume is not needed any
+    /// more then.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; some only at the end.
+    pub fn begin(
+        volume: &Volume,
+        labels: Option<Vec<f64>>,
+        params: LabelParams,
+    ) -> Result<impl Future<Output = Result<Self, MethodError>> + use<>, MethodError> {
         params.check_ranges()?;
         check_precision(volume)?;
-        let nets = Nets::new(LabelGrid::new(volume, labels)?, volume.affine())?;
+        Ok(Self::create(LabelGrid::new(volume, labels)?, volume.affine(), params))
+    }
+
+    async fn create(grid: LabelGrid, to_world: DAffine3, params: LabelParams) -> Result<Self, MethodError> {
+        let pauses = Pauses::default();
+        let nets = Nets::new(grid, to_world)?;
         let everywhere = nets.everywhere();
+        pauses.after(nets.cells.slots().len()).await;
         let mut surfaces = Self {
             counts: Counts::default(),
             label_counts: Vec::new(),
@@ -139,9 +159,12 @@ impl LabelSurfaces {
             off: BTreeMap::new(),
             clock: || 0.0,
         };
+        let cells = surfaces.nets.cells.slots().len();
         surfaces.recount();
-        surfaces.nets.untangle(everywhere);
+        pauses.after(cells).await;
+        surfaces.nets.untangle(everywhere, &pauses).await;
         surfaces.wake(everywhere);
+        pauses.after(cells).await;
         surfaces.coarsen(everywhere, &[], &mut []);
         Ok(surfaces)
     }
@@ -219,7 +242,8 @@ impl LabelSurfaces {
         }
         self.count(&touched, Counts::add);
         self.components.update(&self.nets.cells, &changed);
-        let untangled = if updated.is_ok() { self.nets.untangle(touched) } else { Vec::new() };
+        let untangle = async |nets: &mut Nets| nets.untangle(touched, &Pauses::default()).await;
+        let untangled = if updated.is_ok() { finished(untangle(&mut self.nets)) } else { Vec::new() };
         let area = changed.grown(HALO, dims);
         self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
         let mut reconnected = updated.as_ref().map_or_else(|_| self.nets.no_labels(), Clone::clone);
@@ -296,6 +320,15 @@ impl LabelSurfaces {
     /// # Errors
     /// None at present.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
+        finished(self.step_in_slices())
+    }
+
+    /// Makes one step as [`Self::step`] does, in [slices](crate::methods::slices).
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub async fn step_in_slices(&mut self) -> Result<StepReport, MethodError> {
+        let pauses = Pauses::default();
         let mut times = Times::default();
         if let Some(mut zone) = self.zone.take() {
             self.steps += 1;
@@ -304,44 +337,45 @@ impl LabelSurfaces {
             self.iterations += wanted;
             let is_last = self.iterations >= self.params.smoothing;
             let (offsets, diagonals) = (zone.offsets.clone(), zone.diagonals());
-            let mut noted = Vec::new();
-            self.timed("smoothing", &mut times, |surfaces| {
-                for i in 1..=wanted {
-                    surfaces.residual = zone.smooth();
-                    if i % BETWEEN == 0 {
-                        zone.balance();
-                    }
+            let start = (self.clock)();
+            for i in 1..=wanted {
+                self.residual = zone.smooth();
+                if i % BETWEEN == 0 {
+                    pauses.after(zone.moving()).await;
+                    zone.balance();
                 }
-            });
-            self.timed("volumes", &mut times, |surfaces| {
-                let balances = if is_last && wanted > 0 { BALANCES } else { 0 };
-                (0..balances).for_each(|_| zone.balance());
-                if is_last {
-                    noted = surfaces.noted(&zone);
-                }
-                zone.write(&mut surfaces.nets);
-                if balances > 0 && !noted.is_empty() {
-                    zone.balance_thin(&mut surfaces.nets, &noted);
-                }
-            });
+                pauses.after(zone.moving()).await;
+            }
+            let start = self.note("smoothing", &mut times, start);
+            let balances = if is_last && wanted > 0 { BALANCES } else { 0 };
+            for _ in 0..balances {
+                zone.balance();
+                pauses.after(zone.moving()).await;
+            }
+            let noted = if is_last { self.noted(&zone) } else { Vec::new() };
+            zone.write(&mut self.nets);
+            if balances > 0 && !noted.is_empty() {
+                zone.balance_thin(&mut self.nets, &noted, &pauses).await;
+            }
+            let start = self.note("volumes", &mut times, start);
             let area = zone.area.grown(1, self.nets.grid.dims());
-            let mut untangled = Vec::new();
             let [mut moved, mut reconnected] = [(); 2].map(|()| self.nets.no_labels());
-            self.timed("intersections", &mut times, |surfaces| {
-                untangled = surfaces.nets.untangle(area);
-                zone.read(&surfaces.nets);
-                surfaces.nets.flag_labels_in(zone.moved_from(&offsets), &mut moved);
-                zone.flag_reconnected(&diagonals, &mut reconnected);
-                // Diagonals around these are not known, as far as they are outside the zone.
-                surfaces.nets.flag_labels_in(untangled.iter().copied(), &mut reconnected);
-            });
+            let untangled = self.nets.untangle(area, &pauses).await;
+            zone.read(&self.nets);
+            self.nets.flag_labels_in(zone.moved_from(&offsets), &mut moved);
+            zone.flag_reconnected(&diagonals, &mut reconnected);
+            // Diagonals around these are not known, as far as they are outside the zone.
+            self.nets.flag_labels_in(untangled.iter().copied(), &mut reconnected);
+            let start = self.note("intersections", &mut times, start);
+            pauses.after(zone.moving()).await;
             let seen = if is_last { zone.numbers() } else { Vec::new() };
             self.zone = (!is_last).then_some(zone);
-            self.timed("coarsening", &mut times, |surfaces| {
-                surfaces.coarsen(area, &untangled, &mut reconnected);
-            });
+            self.coarsen(area, &untangled, &mut reconnected);
+            let start = self.note("coarsening", &mut times, start);
+            pauses.after(self.nets.cells.slots().len()).await;
             if is_last {
-                self.timed("volumes", &mut times, |surfaces| surfaces.measure(&seen, &noted));
+                self.measure(&seen, &noted, &pauses).await;
+                self.note("volumes", &mut times, start);
             }
             self.versions.record(&moved, &reconnected);
         }
@@ -371,7 +405,7 @@ impl LabelSurfaces {
     }
 
     /// Measures the labels in a zone whose volumes may be off: those noted, and with longer edges all that were seen.
-    fn measure(&mut self, seen: &[u16], noted: &[u16]) {
+    async fn measure(&mut self, seen: &[u16], noted: &[u16], pauses: &Pauses) {
         let measured = if self.params.edge > 1.0 { seen } else { noted };
         for number in seen {
             self.off.remove(number);
@@ -382,13 +416,14 @@ impl LabelSurfaces {
             if voxels > 0.0 && error.abs() > WARNED {
                 self.off.insert(number, error);
             }
+            pauses.after(self.nets.slots_of(number).len()).await;
         }
     }
 
     /// Measures all labels, when nothing is to be smoothed any more.
     fn measure_all(&mut self) {
         let all: Vec<u16> = (1..=self.label_counts.len() as u16).collect();
-        self.measure(&all, &all);
+        finished(self.measure(&all, &all, &Pauses::default()));
     }
 
     fn warnings(&self) -> Vec<Warning> {
@@ -406,10 +441,11 @@ impl LabelSurfaces {
         off.map(warning).collect()
     }
 
-    fn timed(&mut self, part: &'static str, times: &mut Times, work: impl FnOnce(&mut Self)) {
-        let start = (self.clock)();
-        work(self);
-        times.add(part, (self.clock)() - start);
+    /// Adds the time since `start` to that of a part; returns the time now.
+    fn note(&self, part: &'static str, times: &mut Times, start: f64) -> f64 {
+        let now = (self.clock)();
+        times.add(part, now - start);
+        now
     }
 
     fn wake(&mut self, area: CellBox) {

@@ -3,10 +3,12 @@ use super::*;
 use crate::core_tests::common::seeds;
 use crate::math::{DAffine3, DVec3, Random, Vec3};
 use crate::mesh::{measure, report};
+use crate::methods::slices::advance;
 use crate::spatial::TriangleTree;
 use crate::volume::{VolumeInit, Voxels, voxels_inside};
 use crate::warning::Place;
 use nets::NetVertex;
+use std::task::Poll;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -702,4 +704,40 @@ fn coarse_surfaces_follow_strokes_as_if_made_anew() {
     let mut other = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
     other.restore(&state).unwrap();
     assert!(other.surface() == surfaces.surface());
+}
+
+#[test]
+fn surfaces_made_in_slices_are_the_same() {
+    let volume = noise([12, 11, 10], 3, 5);
+    let mut whole = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
+    let mut creation = Box::pin(LabelSurfaces::begin(&volume, None, LabelParams::default()).unwrap());
+    let (mut slices, mut created) = (1, None);
+    while created.is_none() {
+        match advance(&mut creation) {
+            Poll::Pending => slices += 1,
+            Poll::Ready(surfaces) => created = Some(surfaces.unwrap()),
+        }
+    }
+    let mut sliced = created.unwrap();
+    assert_eq!(sliced.save(), whole.save());
+    // Work is in many slices, so that none takes long.
+    assert!(slices > 10, "{slices}");
+    loop {
+        let report = whole.step().unwrap();
+        let (mut step, mut found) = (Box::pin(sliced.step_in_slices()), None);
+        slices = 1;
+        while found.is_none() {
+            match advance(&mut step) {
+                Poll::Pending => slices += 1,
+                Poll::Ready(report) => found = Some(report.unwrap()),
+            }
+        }
+        drop(step);
+        assert_eq!((found.as_ref().map(|found| found.done), slices > 10), (Some(report.done), true));
+        assert_eq!(sliced.save(), whole.save());
+        if report.done {
+            break;
+        }
+    }
+    check(&sliced, "in slices");
 }

@@ -10,6 +10,7 @@ use super::nets::{GAP, NetVertex, Nets};
 use super::zone::{NONE, Polygon, Zone, pair, step_to, within_reach};
 use crate::math::Vec3;
 use crate::math::order::sort_distinct;
+use crate::methods::slices::Pauses;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The number of voxels per face below which a label is thin; a sheet of four voxels between others has two. Above, what
@@ -97,7 +98,7 @@ impl Zone {
 
     /// Gives volume to the given labels, the thinner ones first, until they have that of their voxels in the zone, or cells
     /// have no more room, and copies the positions to the surfaces.
-    pub fn balance_thin(&mut self, nets: &mut Nets, labels: &[u16]) {
+    pub async fn balance_thin(&mut self, nets: &mut Nets, labels: &[u16], pauses: &Pauses) {
         let mut labels = self.thin_labels(nets, labels);
         for _ in 0..MEASURES {
             self.write(nets);
@@ -108,8 +109,9 @@ impl Zone {
                 } else {
                     0.0
                 };
+                pauses.after(label.polygons.len()).await;
             }
-            if !self.balance_each(&labels) {
+            if !self.balance_each(&labels, pauses).await {
                 return;
             }
         }
@@ -117,7 +119,7 @@ impl Zone {
     }
 
     /// Runs rounds of giving volume to each label; returns whether any cell may have moved.
-    fn balance_each(&mut self, labels: &[ThinLabel]) -> bool {
+    async fn balance_each(&mut self, labels: &[ThinLabel], pauses: &Pauses) -> bool {
         let mut before = vec![f64::INFINITY; labels.len()];
         let mut has_moved = false;
         for _ in 0..ROUNDS {
@@ -130,6 +132,7 @@ impl Zone {
                     any = true;
                 }
                 *before = sum.abs();
+                pauses.after(label.polygons.len()).await;
             }
             has_moved |= any;
             if !any {

@@ -11,6 +11,7 @@ use super::nets::{Crossing, NetVertex, Nets};
 use crate::math::Vec3;
 use crate::math::order::sort_distinct;
 use crate::mesh::{Facet, facets_intersect};
+use crate::methods::slices::Pauses;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -20,6 +21,8 @@ const HALVINGS: u32 = 3;
 /// Sine-like measure below which a triangle counts as a needle, whose normal is not relied on: twice its area, in
 /// square voxels.
 const NEEDLE: f32 = 1e-3;
+/// Units of work of the test of a cell.
+const WORK_OF_CELL: usize = 8;
 /// Distance, in voxels, by which positions may differ between index space and world space in single precision, with
 /// room to spare.
 const MARGIN: f32 = 1e-3;
@@ -72,7 +75,7 @@ struct Neighbourhood {
 impl Nets {
     /// Moves cells towards their middle until no surfaces intersect in and around the cells of a box. Returns the slots of
     /// the cells moved.
-    pub fn untangle(&mut self, area: CellBox) -> Vec<u32> {
+    pub async fn untangle(&mut self, area: CellBox, pauses: &Pauses) -> Vec<u32> {
         let mut halved: BTreeMap<u32, u32> = BTreeMap::new();
         let mut to_test = self.cells.within(&area);
         let mut neighbourhood = Neighbourhood::default();
@@ -81,6 +84,7 @@ impl Nets {
             for &slot in &to_test {
                 neighbourhood.fill(self, slot);
                 neighbourhood.find_intersections(self, &mut tangled);
+                pauses.after(WORK_OF_CELL).await;
             }
             sort_distinct(&mut tangled);
             tangled.retain(|slot| halved.get(slot).is_none_or(|&times| times <= HALVINGS));

@@ -1,0 +1,71 @@
+//! Long computations in slices: they are futures that pause now and then, so that a caller can do other things meanwhile,
+//! or stop. What they compute does not depend on where they pause.
+
+use std::cell::Cell;
+use std::future::{Future, poll_fn};
+use std::pin::pin;
+use std::rc::Rc;
+use std::task::{Context, Poll, Waker};
+
+/// Units of work of a slice; a unit takes some microseconds.
+const SLICE: u32 = 500;
+
+/// The pauses of a computation, which counts its work.
+#[derive(Clone, Default)]
+pub struct Pauses(Rc<Cell<u32>>);
+
+impl Pauses {
+    /// Counts work that was done, and pauses if a slice is complete.
+    pub async fn after(&self, work: usize) {
+        let done = self.0.get().saturating_add(u32::try_from(work).unwrap_or(u32::MAX));
+        self.0.set(done);
+        if done >= SLICE {
+            self.0.set(0);
+            pause().await;
+        }
+    }
+}
+
+/// Is pending once.
+async fn pause() {
+    let mut is_over = false;
+    poll_fn(|_| if std::mem::replace(&mut is_over, true) { Poll::Ready(()) } else { Poll::Pending }).await;
+}
+
+/// Runs a computation up to its next pause, or its end.
+pub fn advance<F: Future + Unpin + ?Sized>(computation: &mut F) -> Poll<F::Output> {
+    std::pin::Pin::new(computation).poll(&mut Context::from_waker(Waker::noop()))
+}
+
+/// Runs a computation to its end.
+pub fn finished<F: Future>(computation: F) -> F::Output {
+    let mut computation = pin!(computation);
+    loop {
+        if let Poll::Ready(result) = computation.as_mut().poll(&mut Context::from_waker(Waker::noop())) {
+            return result;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn computations_pause_after_a_slice_of_work() {
+        let sum = async |pauses: Pauses| {
+            let mut sum = 0;
+            for i in 0..10 {
+                pauses.after(SLICE as usize / 2).await;
+                sum += i;
+            }
+            sum
+        };
+        assert_eq!(finished(sum(Pauses::default())), 45);
+        let mut computation = Box::pin(sum(Pauses::default()));
+        let pauses = (0..).take_while(|_| advance(&mut computation).is_pending()).count();
+        assert_eq!(pauses, 5);
+    }
+}
