@@ -2,7 +2,7 @@
 // of the built app, with a computed torus instead of their models. Rendering is in software, and is timed as long as it
 // blocks the page.
 import { launchChromium } from '../scripts/chromium.mjs';
-import { serve } from '../scripts/serve.mjs';
+import { serveApp } from '../scripts/serve.mjs';
 
 /** Expression that makes each page render immediately. */
 const DRAW = {
@@ -19,7 +19,7 @@ const FIRST = 5;
 
 /** Returns the median milliseconds per frame for each host: of the update, and of rendering. */
 export async function measure(folder) {
-  const server = await serve(folder);
+  const server = await serveApp(folder);
   const browser = await launchChromium();
   try {
     const rows = [];

@@ -1,7 +1,7 @@
 // Measures the built app in Chromium, which renders in software: start-up, long tasks while models run, frame rate of
 // the view, memory, and how often a mesh is copied.
 import { launchChromium } from '../scripts/chromium.mjs';
-import { serve } from '../scripts/serve.mjs';
+import { serveApp } from '../scripts/serve.mjs';
 import { watchPage, watchWorker } from './watch.mjs';
 
 const VIEWPORT = { width: 1280, height: 800 };
@@ -178,7 +178,7 @@ async function memory(browser, address) {
 
 /** Measures everything, of the app in a folder. */
 export async function measure(folder, repeats) {
-  const server = await serve(folder);
+  const server = await serveApp(folder);
   const { address } = server;
   const cold = await coldStart(address, repeats);
   const browser = await launchChromium();

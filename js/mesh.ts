@@ -111,7 +111,7 @@ export interface MeshReport {
    */
   selfIntersections: number;
   /**
-   * Present, and true, if there are more self-intersections than were counted: that ends at a million, or where so many
+   * Present, and true, if there are more self-intersections than were counted: that ends at 100,000, or where so many
    * triangles lie on each other that it would take minutes.
    */
   hasMore?: true;

@@ -2,7 +2,7 @@
 // controls in each are kept in docs/pictures.json; a test of the app fails when the app has other ones, and pictures are outdated.
 import { mkdir, writeFile } from 'node:fs/promises';
 import { launchChromium } from './chromium.mjs';
-import { serve } from './serve.mjs';
+import { serveApp } from './serve.mjs';
 import { at, say, script, startedAs } from './shell.mjs';
 
 /** Size of the page in pictures. */
@@ -54,7 +54,7 @@ async function shoot(page, address, { hash, file, coverage = false, ...format })
 
 async function takePictures() {
   await mkdir(at('docs'), { recursive: true });
-  const server = await serve(at('dist'), 0);
+  const server = await serveApp(at('dist'), 0);
   const browser = await launchChromium();
   try {
     const controls = {};

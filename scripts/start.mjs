@@ -2,14 +2,14 @@
 // port.
 import { buildApp } from './app.mjs';
 import { build } from './build.mjs';
-import { serve } from './serve.mjs';
+import { serveApp } from './serve.mjs';
 import { setup } from './setup.mjs';
 import { at, say, script } from './shell.mjs';
 
 async function listen() {
   const { PORT } = process.env;
-  if (PORT) return serve(at('dist'), Number(PORT));
-  return serve(at('dist'), 5173).catch(() => serve(at('dist'), 0));
+  if (PORT) return serveApp(at('dist'), Number(PORT));
+  return serveApp(at('dist'), 5173).catch(() => serveApp(at('dist'), 0));
 }
 
 await script(async () => {

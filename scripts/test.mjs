@@ -5,6 +5,7 @@
 import { existsSync } from 'node:fs';
 import { mkdir, readFile, rm, writeFile } from 'node:fs/promises';
 import { buildApp } from './app.mjs';
+import { audit, wordsOf } from './audit.mjs';
 import { build } from './build.mjs';
 import { setup } from './setup.mjs';
 import { at, must, run, say, tool } from './shell.mjs';
@@ -36,6 +37,18 @@ const works = (work) => async () => {
   await work();
   return { passed: 1, failed: 0 };
 };
+
+/** Audits what is in the lock files. What could not be audited is not counted, but said at the end. */
+async function auditAll() {
+  const results = await audit();
+  const inState = (wanted) => results.filter(({ state }) => state === wanted);
+  return {
+    passed: inState('clean').length,
+    failed: inState('found').length,
+    missed: inState('missed'),
+    output: results.map((one) => `${one.name}: ${wordsOf(one)}\n${one.output}`).join('\n'),
+  };
+}
 
 /** Sums the counts of all `test result:` lines, as cargo's harness and the wasm runner print them. */
 export function countCargo(output) {
@@ -150,6 +163,7 @@ const LONG = [
       ],
     ],
     [
+      ['audit', auditAll, 60],
       ['doc tests', cargoTests(['--doc', '--profile', 'dev'], NO_DEBUG), 80],
       ['slow', cargoTests(['--lib', '--', '--ignored', '--show-output', ...skipping(BY_HAND)]), 800],
       ['more seeds', cargoTests(['--lib', '--', ...RANDOM, '--show-output'], { env: { FUZZ_TIMES: '8' } }), 1000],
@@ -185,7 +199,8 @@ async function attempt([name, work, budget]) {
   });
   await writeFile(at(LOGS, `${name.replaceAll(' ', '-')}.log`), output);
   if (counts.failed && !echo) process.stdout.write(`\n── ${name}: failed\n${failuresIn(output)}\n`);
-  return { name, budget, ...withinTwice(budget, { seconds: (performance.now() - started) / 1000, ...counts }) };
+  const seconds = (performance.now() - started) / 1000;
+  return { name, budget, missed: counts.missed ?? [], ...withinTwice(budget, { seconds, ...counts }) };
 }
 
 /** Fails a stage that takes more than twice its budget in continuous integration; elsewhere machines differ. */
@@ -199,15 +214,21 @@ async function record(results) {
   const commit = (await must('git', ['rev-parse', 'HEAD'])).trim();
   const passed = results.reduce((total, one) => total + one.passed, 0);
   const date = new Date().toISOString().slice(0, 10);
-  await writeFile(at(RECORD), `${JSON.stringify({ date, commit, passed }, null, 2)}\n`);
+  const missed = missedIn(results);
+  const all = { date, commit, passed, ...(missed.length > 0 && { notAudited: missed }) };
+  await writeFile(at(RECORD), `${JSON.stringify(all, null, 2)}\n`);
 }
+
+/** Returns the names of what could not be audited. */
+const missedIn = (results) => results.flatMap(({ missed }) => missed.map(({ name }) => name));
 
 async function sayWhenAllRan() {
   if (!existsSync(at(RECORD))) return say('test:all', 'never ran');
-  const { date, commit } = JSON.parse(await readFile(at(RECORD), 'utf8'));
+  const { date, commit, notAudited } = JSON.parse(await readFile(at(RECORD), 'utf8'));
   const { code, output } = await run('git', ['rev-list', '--count', `${commit}..HEAD`], { echo: false });
   const since = code === 0 ? `, ${output.trim()} commits ago` : '';
-  say('test:all', `last passed on ${date} on ${commit.slice(0, 7)}${since}`);
+  const without = notAudited ? `, without an audit of ${notAudited.join(' and ')}` : '';
+  say('test:all', `last passed on ${date} on ${commit.slice(0, 7)}${since}${without}`);
 }
 
 /**
@@ -256,12 +277,13 @@ const isLong = given.includes(EVERYTHING) || names.some((name) => LONG.flat(2).s
 const results = await all(names, isLong ? [...GROUPS, ...LONG] : GROUPS);
 const sum = (key) => results.reduce((total, result) => total + result[key], 0);
 process.stdout.write('\n');
-for (const { name, seconds, budget, passed, failed } of results) {
+for (const { name, seconds, budget, passed, failed, missed } of results) {
   const counts = `${String(passed).padStart(5)} passed ${String(failed).padStart(4)} failed`;
   say(
     name,
     `${counts} ${seconds.toFixed(1).padStart(7)} s of ${String(budget).padStart(3)}${seconds > budget ? ', over' : ''}`,
   );
+  for (const one of missed) say(name, `${one.name} ${wordsOf(one)}`);
 }
 if (given.includes(EVERYTHING) && sum('failed') === 0) await record(results);
 await sayWhenAllRan();

@@ -2,6 +2,7 @@ import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { defineConfig, type Plugin, type Rolldown } from 'vite';
 import { noteBundled } from '../scripts/licences.mjs';
+import { APP_POLICY, EXTRACT_WORKER } from '../scripts/policy.mjs';
 
 /** A live page for each host that there is an adapter for. */
 const EMBEDS = [
@@ -19,12 +20,13 @@ const EMBEDS = [
 
 const here = (path: string) => fileURLToPath(new URL(path, import.meta.url));
 
-/** While developing, Vite puts styles inline, which the page's content-security policy forbids; the built page keeps the policy. */
-function relaxPolicyWhileDeveloping(): Plugin {
+/** Puts the built pages under their policy. While developing, Vite puts styles inline, which it forbids. */
+function underPolicy(): Plugin {
+  const attrs = { 'http-equiv': 'Content-Security-Policy', content: APP_POLICY };
   return {
-    name: 'relax-policy-while-developing',
-    apply: 'serve',
-    transformIndexHtml: (html) => html.replace(/<meta\s+http-equiv="Content-Security-Policy"[^>]*>/, ''),
+    name: 'under-policy',
+    apply: 'build',
+    transformIndexHtml: () => [{ tag: 'meta', attrs, injectTo: 'head-prepend' }],
   };
 }
 
@@ -160,6 +162,10 @@ function ownMethod(): Plugin {
   };
 }
 
+/** The Extract lab's worker has a policy of its own, which servers choose by its name. */
+const nameWorker = ({ facadeModuleId }: Rolldown.PreRenderedChunk) =>
+  `assets/${facadeModuleId === here('src/worker.ts') ? EXTRACT_WORKER : '[name]'}-[hash].js`;
+
 /** For the notices beside the page. */
 const noted = noteBundled(
   'app',
@@ -178,16 +184,14 @@ export default defineConfig({
       { find: /^vesicle$/, replacement: here('../pkg') },
     ],
   },
-  plugins: [
-    relaxPolicyWhileDeveloping(),
-    sameVtk(),
-    withoutClipper(),
-    newestFonts(),
-    decodersBeside(),
-    listFiles(),
-    noted.page,
-  ],
-  worker: { format: 'es', plugins: () => [ownMethod(), noted.worker] },
+  plugins: [underPolicy(), sameVtk(), withoutClipper(), newestFonts(), decodersBeside(), listFiles(), noted.page],
+  worker: {
+    format: 'es',
+    plugins: () => [ownMethod(), noted.worker],
+    rolldownOptions: { output: { entryFileNames: nameWorker } },
+  },
+  server: { host: '127.0.0.1' },
+  preview: { host: '127.0.0.1' },
   build: {
     outDir: here('../dist'),
     emptyOutDir: true,

@@ -1,5 +1,6 @@
 // Decoders of compressed images: libraries of others, each imported when the first image that needs it is read.
 import { invalid } from '../check.js';
+import { shortened } from '../short-text.js';
 import { badDicom, reasonOf } from './error.js';
 
 /** A decoder of images: a library of others. */
@@ -79,21 +80,23 @@ const HTJ2K: Codec = {
 };
 
 /** Decoders by transfer syntax (PS3.5, annex A.4), after the prefix of all. */
-const CODECS: Record<string, Codec> = {
-  ...{ '4.50': JPEG, '4.51': JPEG, '4.57': JPEG_LOSSLESS, '4.70': JPEG_LOSSLESS },
-  ...{ '4.80': JPEG_LS, '4.81': JPEG_LS, '4.90': JPEG_2000, '4.91': JPEG_2000 },
-  ...{ '4.201': HTJ2K, '4.202': HTJ2K, '4.203': HTJ2K },
-};
+const CODECS = new Map(
+  Object.entries({
+    ...{ '4.50': JPEG, '4.51': JPEG, '4.57': JPEG_LOSSLESS, '4.70': JPEG_LOSSLESS },
+    ...{ '4.80': JPEG_LS, '4.81': JPEG_LS, '4.90': JPEG_2000, '4.91': JPEG_2000 },
+    ...{ '4.201': HTJ2K, '4.202': HTJ2K, '4.203': HTJ2K },
+  }),
+);
 
 const PREFIX = '1.2.840.10008.1.2.';
 
 /** Returns the decoder of a transfer syntax; throws `bad-file` if there is none, `invalid-argument` if it is missing. */
 export async function decoderOf(transferSyntax: string, decoders: Decoders): Promise<Decode> {
-  const codec = transferSyntax.startsWith(PREFIX) ? CODECS[transferSyntax.slice(PREFIX.length)] : undefined;
+  const codec = transferSyntax.startsWith(PREFIX) ? CODECS.get(transferSyntax.slice(PREFIX.length)) : undefined;
   if (!codec)
     throw badDicom(
       'transfer syntax',
-      `${transferSyntax} is not supported; accepted: uncompressed, deflated, RLE, JPEG, JPEG-LS, JPEG 2000, HTJ2K`,
+      `${shortened(transferSyntax)} is not supported; accepted: uncompressed, deflated, RLE, JPEG, JPEG-LS, JPEG 2000, HTJ2K`,
     );
   try {
     return await loaded(codec, decoders[codec.option]);

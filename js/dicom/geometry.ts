@@ -44,30 +44,32 @@ export function largest(numbers: Iterable<number>): number {
   return most;
 }
 
+/** Returns the smallest of numbers, and infinity if there are none. */
+export function smallest(numbers: Iterable<number>): number {
+  let least = Infinity;
+  for (const number of numbers) least = Math.min(least, number);
+  return least;
+}
+
 const shown = (length: number) => `${Number(length.toPrecision(4))} mm`;
 
 /** Returns the distances of sorted slices from the first one, along the normal. */
 export function distancesOf(slices: readonly Frame[]): number[] {
   const [first] = slices;
   if (!first) return [];
-  const normal = cross(first.along, first.down);
-  return slices.map(({ position }) => dot(minus(position, first.position), normal));
+  const [nx, ny, nz] = cross(first.along, first.down);
+  const [x, y, z] = first.position;
+  return slices.map(({ position }) => (position[0] - x) * nx + (position[1] - y) * ny + (position[2] - z) * nz);
 }
 
 /** Returns how sorted slices are spaced. */
 export function evennessOf(slices: readonly Frame[]): Evenness {
   const [first, last] = [slices[0], slices.at(-1)];
   if (!first || !last || slices.length < 3) return { kind: 'even' };
+  const reason = shiftOf(slices);
+  if (reason !== undefined) return { kind: 'shifted', reason };
   const distances = distancesOf(slices);
   const extent = distances.at(-1) ?? 0;
-  const sideways = largest(
-    slices.map(({ position }, k) => besideLine(position, first, last, (distances[k] ?? 0) / extent)),
-  );
-  if (sideways > SIDEWAYS * Math.min(...first.spacing))
-    return {
-      kind: 'shifted',
-      reason: `slices are shifted sideways by up to ${shown(sideways)} from the line through the first and last`,
-    };
   const step = extent / (slices.length - 1);
   const off = largest(distances.map((distance, k) => Math.abs(distance - k * step)));
   if (off > EVEN * step) return uneven(distances);
@@ -76,6 +78,20 @@ export function evennessOf(slices: readonly Frame[]): Evenness {
     kind: 'even',
     note: `Slices are up to ${shown(off)} off equal distances of ${shown(step)}, and count as even.`,
   };
+}
+
+/** Returns how far sorted slices are from a line, if that is too far for one volume. */
+export function shiftOf(slices: readonly Frame[]): string | undefined {
+  const [first, last] = [slices[0], slices.at(-1)];
+  if (!first || !last) return undefined;
+  const distances = distancesOf(slices);
+  const extent = distances.at(-1) ?? 0;
+  const along = (k: number) => (extent === 0 ? 0 : (distances[k] ?? 0) / extent);
+  let sideways = 0;
+  for (const [k, { position }] of slices.entries())
+    sideways = Math.max(sideways, besideLine(position, first, last, along(k)));
+  if (sideways <= SIDEWAYS * Math.min(...first.spacing)) return undefined;
+  return `slices are shifted sideways by up to ${shown(sideways)} from the line through the first and last`;
 }
 
 /** Returns the distance of a position from the line through the first and last slice, within the plane of the slice. */

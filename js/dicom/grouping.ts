@@ -11,6 +11,7 @@
  * 4. Images at the same position without any such difference are not read, since the right one is unknown.
  */
 import type { Vec3 } from '../data.js';
+import { shortened } from '../short-text.js';
 import { cross, dot, evennessOf, largest } from './geometry.js';
 import type { Frame } from './types.js';
 
@@ -37,6 +38,9 @@ const KINDS = [...MEASURED, 'image type', 'frame type', 'file'];
 const PHASES = ['temporal position', 'trigger time', 'frame reference time', 'acquisition'];
 /** Attributes that are larger for later images at the same position, but may differ from slice to slice. */
 const CLOCKS = ['trigger time', 'frame reference time', 'acquisition time', 'content time', 'instance'];
+
+/** Most characters of a value in the name of a volume. */
+const LONGEST_VALUE = 100;
 
 /** The slices of a volume: of each of its frames, sorted along the normal. */
 export interface Stack {
@@ -72,13 +76,7 @@ export const normalOf = ({ along, down }: Frame): Vec3 => cross(along, down);
 
 /** Sorts images into volumes. */
 export function stacksOf(images: readonly Frame[]): (Stack | Conflict)[] {
-  const groups: Frame[][] = [];
-  for (const image of images) {
-    // Images of a folder come series by series, mostly, so that the last group is the likely one.
-    const group = groups.findLast(([first]) => first && areAlike(first, image));
-    if (group) group.push(image);
-    else groups.push([image]);
-  }
+  const groups = [...grouped(images, kindOf).values()].flatMap((kind) => gathered(kind, isAlike));
   return groups.flatMap((group) => {
     const { kept, copies } = withoutCopies(group);
     const parts = separated(kept, '');
@@ -88,23 +86,45 @@ export function stacksOf(images: readonly Frame[]): (Stack | Conflict)[] {
   });
 }
 
-/** Rule 1. */
-function areAlike(one: Frame, other: Frame): boolean {
-  const [a, b] = [one.format, other.format];
-  return (
-    one.series.uid === other.series.uid &&
-    one.series.origin === other.series.origin &&
-    one.series.sopClass === other.series.sopClass &&
-    one.series.frameOfReference === other.series.frameOfReference &&
-    one.series.inverted === other.series.inverted &&
-    a.rows === b.rows &&
-    a.columns === b.columns &&
-    a.bitsAllocated === b.bitsAllocated &&
-    a.signed === b.signed &&
-    a.float === b.float &&
-    one.spacing.every((size, k) => Math.abs(size - (other.spacing[k] ?? 0)) <= SAME_SPACING * size) &&
-    isParallel(one, other)
-  );
+/** Groups that an image may belong to: damaged files have as many as images, and comparing them all would not end. */
+const RECENT = 500;
+
+/** Returns images in groups, of which each is alike the first one, and one of the last groups before it. */
+function gathered(images: readonly Frame[], isOne: (one: Frame, other: Frame) => boolean): Frame[][] {
+  const groups: Frame[][] = [];
+  for (const image of images) {
+    // Images of a folder come series by series, mostly, so that the last group is the likely one.
+    let k = groups.length - 1;
+    const end = Math.max(0, groups.length - RECENT);
+    while (k >= end && !isOne(groups[k]?.[0] as Frame, image)) k -= 1;
+    const group = k >= end ? groups[k] : undefined;
+    if (group) group.push(image);
+    else groups.push([image]);
+  }
+  return groups;
+}
+
+/** Returns what of an image is exactly the same in all others of a volume (rule 1). */
+function kindOf({ series, format }: Frame): string {
+  const known = kinds.get(series);
+  if (known !== undefined) return known;
+  const { uid, origin, sopClass, frameOfReference, inverted } = series;
+  const { rows, columns, bitsAllocated, signed, float } = format;
+  const kind = JSON.stringify([
+    ...[uid, origin, sopClass, frameOfReference, inverted],
+    ...[rows, columns, bitsAllocated, signed, float],
+  ]);
+  kinds.set(series, kind);
+  return kind;
+}
+
+/** Kinds of the images of each file, which share their series and format. */
+const kinds = new WeakMap<Frame['series'], string>();
+
+/** Whether two images of the same kind may be of one volume (rule 1). */
+export function isAlike(one: Frame, other: Frame): boolean {
+  const isSameSize = one.spacing.every((size, k) => Math.abs(size - (other.spacing[k] ?? 0)) <= SAME_SPACING * size);
+  return isSameSize && isParallel(one, other);
 }
 
 /** Whether two images have the same directions. */
@@ -119,9 +139,13 @@ const isNear = (a: Vec3, b: Vec3) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] -
 /** Rule 2. Files that lost their identifiers all have the same; those at other positions are no copies. */
 function withoutCopies(group: Frame[]): { kept: Frame[]; copies: number } {
   const seen = new Set<string>();
+  const texts = new Map<object, string>();
   const kept = group.filter(({ uid, index, position, instance, marks }) => {
     if (uid === '') return true;
-    const key = JSON.stringify([uid, index, position, instance, marks]);
+    // Many frames may have the same ones.
+    const text = texts.get(marks) ?? JSON.stringify(marks);
+    texts.set(marks, text);
+    const key = JSON.stringify([uid, index, position, instance, text]);
     return !seen.has(key) && seen.add(key);
   });
   return { kept, copies: group.length - kept.length };
@@ -183,9 +207,14 @@ function attributeOf({ marks, file, count }: Frame, mark: string): string | numb
 
 /** Returns the images by the values of an attribute, in the order of these. */
 function byMark(images: readonly Frame[], mark: string): [string, Frame[]][] {
-  const groups = grouped(images, (image) => attributeOf(image, mark));
+  const [first] = images;
+  // As all frames of a file without attributes of their own.
+  const areEqual = mark !== 'file' && first && images.every(({ marks }) => marks === first.marks);
+  const groups = areEqual
+    ? new Map([[attributeOf(first, mark), [...images]]])
+    : grouped(images, (image) => attributeOf(image, mark));
   const sorted = [...groups].toSorted(([a], [b]) => (a < b ? -1 : 1));
-  const name = (value: string | number) => (value === '' ? 'not stated' : value);
+  const name = (value: string | number) => (value === '' ? 'not stated' : shortened(String(value), LONGEST_VALUE));
   return sorted.map(([value, group]) => [`${mark} ${name(value)}`, group]);
 }
 
@@ -209,13 +238,9 @@ function beside(images: readonly Frame[]): [string, Frame[]][] | undefined {
     return first !== undefined && inPlane(first, image) > size;
   });
   if (!isBeside) return undefined;
-  const groups: Frame[][] = [];
-  for (const image of images) {
-    const group = groups.find(([first]) => first && inPlane(first, image) <= size);
-    if (group) group.push(image);
-    else groups.push([image]);
-  }
-  return groups.map((group, k) => [`place ${k + 1}`, group]);
+  const groups = gathered(images, (first, image) => inPlane(first, image) <= size);
+  // Images between two others may be near both of them.
+  return groups.length > 1 ? groups.map((group, k) => [`place ${k + 1}`, group]) : undefined;
 }
 
 /** Returns the distance of two images within their plane. */

@@ -51,6 +51,11 @@ export interface DicomListing {
   skipped: Skipped[];
 }
 
+/** Images that may be read of however small files, and the bytes that each of more of them has at least. */
+const FREE_IMAGES = 100_000;
+const BYTES_PER_IMAGE = 1024;
+const TOO_MANY = { reason: 'too many images of very few voxels', damaged: true };
+
 /**
  * Looks at files, in any order and of any kind, and returns the volumes that the DICOM images among them make up. Of files
  * that are given as `Blob` or `File` only the headers are read.
@@ -72,10 +77,12 @@ export async function openDicom(files: InputFiles, given?: DicomOptions): Promis
   const parser = await importParser();
   const images: Frame[] = [];
   const skipped: Skipped[] = [];
+  const most = FREE_IMAGES + readers.reduce((sum, { size }) => sum + size, 0) / BYTES_PER_IMAGE;
   await withPause(signal, async (pause) => {
     for (const [k, file] of readers.entries()) {
       const found = await imagesIn(parser, file);
       if ('reason' in found) skipped.push(found);
+      else if (images.length + found.length > most) skipped.push({ ...TOO_MANY, name: file.name });
       else for (const image of found) images.push(image);
       onProgress?.({ done: k + 1, total: readers.length });
       await pause.turn();
@@ -97,10 +104,10 @@ export async function readDicom(files: InputFiles, options: DicomReadOptions = {
   const [volume, second] = volumes;
   if (!volume) throw badDicom('files', `no volume: ${reasonsOf(skipped)}`);
   if (second) {
-    const names = volumes.map(({ name, dims }) => `${name} (${dims.join(' × ')})`).join('; ');
+    const names = volumes.map(({ name, dims }) => `${name} (${dims.join(' × ')})`);
     throw invalid(
       'files',
-      `hold ${volumes.length} volumes, of which openDicom returns a list to choose from: ${names}`,
+      `hold ${volumes.length} volumes, of which openDicom returns a list to choose from: ${listed(names, '; ')}`,
     );
   }
   return volume.read(options);
@@ -129,14 +136,16 @@ function volumesOf(parser: Parser, images: readonly Frame[], skipped: Skipped[])
   };
   const segmentations = [...grouped(images.filter(isSegment), ({ file }) => file).values()].flatMap((group) => {
     const volume = SegmentationVolume.of(parser, group);
-    if (!volume) skip(group, 'a segmentation with frames at uneven distances');
-    return volume ?? [];
+    if (typeof volume !== 'string') return volume;
+    skip(group, volume);
+    return [];
   });
   const stacks = stacksOf(images.filter((image) => !isSegment(image))).map(usable);
   const left = stacks.filter((one) => 'reason' in one);
   for (const { images, reason } of left) skip(images, reason);
   const whole = stacks.filter((one) => 'frames' in one);
-  const volumes = whole.map((stack) => new ImageVolume(parser, { ...stack, ...beside(stack, whole, left, damaged) }));
+  const rest = new Rest(whole, left, damaged);
+  const volumes = whole.map((stack) => new ImageVolume(parser, { ...stack, ...beside(stack, rest) }));
   return named([...volumes, ...segmentations]);
 }
 
@@ -150,40 +159,75 @@ function usable(stack: Stack | Conflict): Stack | Conflict {
   return evenness.kind === 'shifted' ? { images, reason: evenness.reason } : stack;
 }
 
+const firstOf = ({ frames }: Stack) => frames[0]?.[0] as Frame;
+
+/** Images and volumes beside the stacks of each series. */
+class Rest {
+  readonly #unlabelled: Map<string, Stack[]>;
+  readonly #left: Map<string, Conflict[]>;
+  readonly #damaged: Skipped[];
+  readonly #files = new Map<string, string[]>();
+
+  constructor(stacks: readonly Stack[], left: readonly Conflict[], damaged: Skipped[]) {
+    const plain = stacks.filter(({ label }) => label === '');
+    this.#unlabelled = grouped(plain, (stack) => firstOf(stack).series.uid);
+    this.#left = grouped(left, ({ images }) => images[0]?.series.uid ?? '');
+    this.#damaged = damaged;
+  }
+
+  /** Returns some of the conflicts of a series, and how many more there are. */
+  conflicts({ uid }: Frame['series']): { some: Conflict[]; more: number } {
+    const all = this.#left.get(uid) ?? [];
+    return { some: all.slice(0, MOST_CONFLICTS), more: Math.max(0, all.length - MOST_CONFLICTS) };
+  }
+
+  /** Returns the names of files that may be of a series, but could not be read. */
+  files({ uid }: Frame['series']): string[] {
+    const known = this.#files.get(uid);
+    const names = known ?? this.#damaged.filter((one) => one.damaged || one.series === uid).map(({ name }) => name);
+    if (!known) this.#files.set(uid, names);
+    return names;
+  }
+
+  /** Whether another volume has images that may belong to a stack. */
+  hasPartOf(stack: Stack): boolean {
+    const first = firstOf(stack);
+    const others = this.#unlabelled.get(first.series.uid) ?? [];
+    return others.slice(0, MOST_OTHERS).some((other) => other !== stack && isPartOf(other, first));
+  }
+}
+
+/** Conflicts that a volume mentions each. */
+const MOST_CONFLICTS = 10;
+/** Volumes of a series that are compared with each of them. */
+const MOST_OTHERS = 100;
+
 /** Returns what should be known of images that are not part of a stack, but may be missing in it. */
-function beside(
-  stack: Stack,
-  stacks: readonly Stack[],
-  left: Conflict[],
-  damaged: Skipped[],
-): Pick<Stack, 'notes' | 'remarks'> {
-  const [first] = stack.frames.flat() as [Frame];
+function beside(stack: Stack, rest: Rest): Pick<Stack, 'notes' | 'remarks'> {
+  const first = firstOf(stack);
   const notes = [...stack.notes];
   const remarks: string[] = [];
-  for (const { images, reason } of left.filter(({ images }) => images[0]?.series.uid === first.series.uid)) {
+  const { some, more } = rest.conflicts(first.series);
+  for (const { images, reason } of some) {
     const count = images.length === 1 ? 'One image' : `${images.length} images`;
     const text = `${count} of the series ${images.length === 1 ? 'is' : 'are'} not part of the volume (${sizeOf(images)}): ${reason}.`;
     const isLocaliser = images.every((image) => image.series.isLocaliser || !isNearlyParallel(image, first));
     (isLocaliser ? remarks : notes).push(text);
   }
-  const files = damaged.filter((one) => one.damaged || one.series === first.series.uid).map(({ name }) => name);
+  if (more > 0) notes.push(`${more} more groups of images of the series are not part of the volume.`);
+  const files = rest.files(first.series);
   if (files.length > 0) notes.push(`${listed(files)} could not be read, and may be missing in the volume.`);
-  if (stacks.some((other) => other !== stack && isPartOf(other, first)))
+  if (rest.hasPartOf(stack))
     notes.push(
       'Other images of the series differ in size, spacing, type of voxels or slightly in orientation: they are a volume of their own.',
     );
   return { notes, remarks };
 }
 
-/** Whether a volume is of the series of an image and nearly parallel, without anything that was measured to distinguish it. */
-function isPartOf({ frames, label }: Stack, image: Frame): boolean {
-  const [one] = frames.flat();
-  const isSame =
-    one !== undefined &&
-    label === '' &&
-    one.series.uid === image.series.uid &&
-    one.series.origin === image.series.origin;
-  return isSame && isNearlyParallel(one, image);
+/** Whether a volume of the same series is nearly parallel to an image. */
+function isPartOf(stack: Stack, image: Frame): boolean {
+  const one = firstOf(stack);
+  return one.series.origin === image.series.origin && isNearlyParallel(one, image);
 }
 
 const sizeOf = ([image]: Frame[]) => `${image?.format.columns} × ${image?.format.rows}`;
@@ -214,5 +258,5 @@ function reasonsOf(skipped: readonly Skipped[]): string {
     counts,
     ([reason, files]) => `${reason} (${files.length === 1 ? files[0]?.name : `${files.length} files`})`,
   );
-  return texts.join('; ') || 'no files';
+  return listed(texts, '; ') || 'no files';
 }

@@ -28,6 +28,9 @@ export function pixelsOf(data: DataSet): Element | undefined {
 export const EXPLICIT = '1.2.840.10008.1.2.1';
 export const IMPLICIT = '1.2.840.10008.1.2';
 const DEFLATED = '1.2.840.10008.1.2.1.99';
+export const BIG_ENDIAN = '1.2.840.10008.1.2.2';
+/** Transfer syntaxes without compression of voxels. */
+export const PLAIN = [IMPLICIT, EXPLICIT, DEFLATED, BIG_ENDIAN];
 
 /** Bytes at the start of a file that are read first, which are all before the pixels of most images. */
 const HEAD = 2 ** 16;
@@ -35,6 +38,14 @@ const HEAD = 2 ** 16;
 const MORE = 8;
 /** Most bytes that a compressed dataset may have. */
 const MOST_INFLATED = 2 ** 31 - 1;
+/**
+ * Elements and items that a compressed data set may have, however few bytes it has, and how many more for each byte. Each
+ * takes hundreds of bytes of memory, and a thousand equal ones a dozen bytes of the file.
+ */
+const FREE_ELEMENTS = 20_000;
+const ELEMENTS_PER_BYTE = 4;
+/** Integers of 16 bits that are read of an element at most: its tag, twice, and its length. */
+const READS = 5;
 
 /** A data set up to its pixels, the bytes that offsets in it refer to, and its transfer syntax. */
 export interface Header {
@@ -110,8 +121,31 @@ async function parse(parser: Parser, file: Source, bytes: Uint8Array, options: {
     return { data: parser.parseDicom(bytes, given), transferSyntax, deflated: false };
   }
   const start = (meta as unknown as { position: number }).position;
-  const inflated = await inflate(await file.read(start));
-  return { ...parseWithout(parser, inflated, options, EXPLICIT), deflated: true };
+  const stored = await file.read(start);
+  const most = FREE_ELEMENTS + ELEMENTS_PER_BYTE * stored.length;
+  return { data: parseLimited(parser, await inflate(stored), options, most), transferSyntax, deflated: true };
+}
+
+/** Exports of dicom-parser beyond its types. */
+type Internals = {
+  DataSet: new (parser: DataSet['byteArrayParser'], bytes: Uint8Array, elements: object) => DataSet;
+  littleEndianByteArrayParser: DataSet['byteArrayParser'];
+};
+
+/** Parses a data set, explicit little-endian, that may have `most` elements and items. */
+function parseLimited(parser: Parser, bytes: Uint8Array, options: { untilTag?: string }, most: number): DataSet {
+  const { DataSet, littleEndianByteArrayParser: little } = parser as unknown as Internals;
+  const stream = new parser.ByteStream(little, bytes, 0);
+  const read = stream.readUint16.bind(stream);
+  let left = READS * most;
+  stream.readUint16 = () => {
+    if (left-- > 0) return read();
+    throw new Error('the compressed data set has more elements than a file of its size can describe');
+  };
+  const data = new DataSet(little, bytes, {});
+  data.warnings = [];
+  parser.parseDicomDataSetExplicit(data, stream, bytes.length, options as { untilTag: string });
+  return data;
 }
 
 function parseWithout(

@@ -1,16 +1,14 @@
 // The voxels of images: from bytes, compressed or not, to typed arrays of stored values.
-import type { DataSet, Element } from 'dicom-parser';
+import type { DataSet, Fragment } from 'dicom-parser';
 import type { VoxelArray } from '../data.js';
 import { type Decode, type Decoded, type Decoders, decoderOf } from './codecs.js';
 import { badDicom, reasonOf } from './error.js';
-import { type Parser, pixelsOf, readWhole } from './parser.js';
+import { BIG_ENDIAN, type Parser, PLAIN, pixelsOf, readWhole } from './parser.js';
 import { decodeRle } from './rle.js';
 import type { Source } from './source.js';
+import { statedSize } from './stated-size.js';
 import type { Frame, PixelFormat } from './types.js';
 
-/** Transfer syntaxes without compression of voxels: implicit, explicit, deflated as a whole, and big-endian. */
-const PLAIN = ['1.2.840.10008.1.2', '1.2.840.10008.1.2.1', '1.2.840.10008.1.2.1.99', '1.2.840.10008.1.2.2'];
-const BIG_ENDIAN = '1.2.840.10008.1.2.2';
 const RLE = '1.2.840.10008.1.2.5';
 
 /** The type of array for stored values of a format. */
@@ -25,7 +23,7 @@ export function arrayOf({ bitsAllocated, signed, float }: PixelFormat): new (len
 export class PixelReader {
   readonly #parser: Parser;
   readonly #decoders: Decoders;
-  #last: { file: Source; data: DataSet } | undefined;
+  #last: { file: Source; data: DataSet; starts?: number[] } | undefined;
   /** Files whose images were compressed with loss, and those that do not end as compressed images do. */
   readonly lossy = new Set<string>();
   readonly endless = new Set<string>();
@@ -53,6 +51,7 @@ export class PixelReader {
     if (transferSyntax !== RLE && !hasEnd(packed)) this.endless.add(image.file.name);
     const decode: Decode =
       transferSyntax === RLE ? (bytes) => decodeRle(bytes, voxels) : await decoderOf(transferSyntax, this.#decoders);
+    checkSize(image, packed);
     try {
       const decoded = decode(packed);
       if (decoded.lossy) this.lossy.add(image.file.name);
@@ -63,7 +62,7 @@ export class PixelReader {
   }
 
   async #plain(image: Frame, voxels: number): Promise<Decoded> {
-    const { file, index, pixelsAt, format } = image;
+    const { file, index, pixelsAt, pixelsEnd, format } = image;
     const { bitsAllocated, transferSyntax } = format;
     const [from, to] = [index, index + 1].map((frame) => pixelsAt + (frame * voxels * bitsAllocated) / 8) as [
       number,
@@ -71,7 +70,12 @@ export class PixelReader {
     ];
     const size = bitsAllocated / 8;
     const source = image.deflated ? (await this.#whole(file)).byteArray : undefined;
-    const read = (start: number, end: number) => source?.subarray(start, end) ?? file.read(start, end);
+    // The elements that follow are no part of the pixels.
+    const until = (end: number) => Math.max(pixelsAt, Math.min(end, pixelsEnd));
+    const read = (start: number, end: number) => {
+      const [first, last] = [until(start), until(end)];
+      return source?.subarray(first, last) ?? file.read(first, last);
+    };
     if (bitsAllocated === 1)
       return { bytes: shifted(await read(Math.floor(from), Math.ceil(to)), (from % 1) * 8), size };
     if (format.inWords && transferSyntax === BIG_ENDIAN) {
@@ -93,25 +97,69 @@ export class PixelReader {
     const element = pixelsOf(data);
     const fragments = element?.fragments ?? [];
     if (!element || fragments.length === 0) throw badDicom(file.name, 'pixel data: no compressed image is there');
-    try {
-      return this.#fragmentsOf(data, element, index, count) as Uint8Array;
-    } catch (error) {
-      throw badDicom(file.name, `pixel data: ${reasonOf(error)}`);
-    }
+    if (count === 1) return joined(file, data, fragments);
+    if (fragments.length === count) return joined(file, data, fragments.slice(index, index + 1));
+    const starts = this.#starts(data);
+    return joined(file, data, fragments.slice(starts[index], starts[index + 1]));
   }
 
-  #fragmentsOf(data: DataSet, element: Element, index: number, count: number): Uint8Array {
-    const parser = this.#parser;
-    const fragments = element.fragments ?? [];
-    const one = (first: number, number: number) =>
-      new Uint8Array(parser.readEncapsulatedPixelDataFromFragments(data, element, first, number));
-    if (count === 1) return one(0, fragments.length);
-    if (fragments.length === count) return one(index, 1);
-    const table = element.basicOffsetTable?.length
-      ? element.basicOffsetTable
-      : parser.createJPEGBasicOffsetTable(data, element);
-    return new Uint8Array(parser.readEncapsulatedImageFrame(data, element, index, table));
+  /** Returns the index of the first fragment of each image, which is found once for all images of a file. */
+  #starts(data: DataSet): number[] {
+    if (this.#last?.starts) return this.#last.starts;
+    const element = pixelsOf(data);
+    const table =
+      element && !element.basicOffsetTable?.length
+        ? this.#parser.createJPEGBasicOffsetTable(data, element)
+        : (element?.basicOffsetTable ?? []);
+    const fragmentAt = new Map(element?.fragments?.map(({ offset }, k) => [offset, k]));
+    const starts = table.map((offset) => fragmentAt.get(offset) ?? -1);
+    if (this.#last) this.#last.starts = starts;
+    return starts;
   }
+}
+
+/** Returns the bytes of fragments one after the other; throws `bad-file` if there are none, or less than all of them. */
+function joined(file: Source, { byteArray }: DataSet, fragments: readonly Fragment[]): Uint8Array {
+  const parts = fragments.map(({ position, length }) => byteArray.subarray(position, position + length));
+  const whole = fragments.reduce((sum, { length }) => sum + length, 0);
+  const found = parts.reduce((sum, { length }) => sum + length, 0);
+  if (fragments.length === 0) throw badDicom(file.name, 'pixel data: a compressed image is missing');
+  if (found < whole) throw badDicom(file.name, `pixel data: needs ${whole} bytes of a compressed image, has ${found}`);
+  const bytes = new Uint8Array(whole);
+  let at = 0;
+  for (const part of parts) {
+    bytes.set(part, at);
+    at += part.length;
+  }
+  return bytes;
+}
+
+/** Voxels of an image whose compressed bytes may be any, and more of them for each of these bytes. */
+const FREE_VOXELS = 2 ** 24;
+const VOXELS_PER_BYTE = 1000;
+/** Most bytes that a byte of RLE can stand for. */
+const RLE_RATIO = 64;
+/** Most parts of an image of JPEG 2000, each of which takes kilobytes of its decoder. */
+const MOST_TILES = 4096;
+
+/** Throws `bad-file` unless a compressed image is as large as its file says, before a decoder allocates memory for it. */
+function checkSize({ format, file }: Frame, packed: Uint8Array): void {
+  const { rows, columns, transferSyntax } = format;
+  const isRle = transferSyntax === RLE;
+  const most = isRle ? RLE_RATIO * packed.length : Math.max(FREE_VOXELS, VOXELS_PER_BYTE * packed.length);
+  if (rows * columns > most)
+    throw badDicom(file.name, `${columns} × ${rows} voxels are more than ${packed.length} compressed bytes can hold`);
+  if (isRle) return;
+  const stated = statedSize(packed);
+  if (!stated) throw badDicom(file.name, 'the compressed image could not be decoded: it states no size');
+  const { width, height, samples, tiles } = stated;
+  if (width !== columns || height !== rows || samples !== 1)
+    throw badDicom(
+      file.name,
+      `the compressed image has ${width} × ${height} pixels of ${samples} samples, the file states ${columns} × ${rows} of 1`,
+    );
+  if (!(tiles <= MOST_TILES))
+    throw badDicom(file.name, `the compressed image has ${tiles} tiles; at most ${MOST_TILES}`);
 }
 
 /** Whether a compressed image has the marker that ends images of the JPEG family, before padding. */

@@ -1,12 +1,14 @@
 // Volumes of segmentations: one frame for each segment and slice, or the labels of each slice (PS3.3, A.51 and A.90).
 import type { VolumeInit } from '../data.js';
 import { withPause } from '../pause.js';
-import { affineOf, distancesOf } from './geometry.js';
+import { listed } from './error.js';
+import { affineOf, distancesOf, shiftOf, smallest } from './geometry.js';
+import { isAlike } from './grouping.js';
 import type { Parser } from './parser.js';
-import { PixelReader } from './pixels.js';
+import { arrayOf, PixelReader } from './pixels.js';
 import { LABEL_MAP } from './segments.js';
 import type { Frame } from './types.js';
-import { allocated, DicomVolume, type Reading, reader, spacingOf } from './volume.js';
+import { allocated, DicomVolume, type Reading, reader, spacingOf, withWarnings } from './volume.js';
 
 /** Part of the distance between slices by which a frame of a segmentation may be off. */
 const OFF = 0.1;
@@ -26,12 +28,12 @@ function slicesOf(images: readonly Frame[]): Slices | undefined {
   const order = images.map((image, k) => [image, normal[k] ?? 0] as const).toSorted((a, b) => a[1] - b[1]);
   const frames = order.map(([image]) => image);
   const distances = distancesOf(frames);
-  const least = Math.min(...frames.map(({ spacing }) => Math.min(...spacing)));
+  const least = smallest(frames.flatMap(({ spacing }) => spacing));
   const steps = distances
     .slice(1)
     .map((distance, k) => distance - (distances[k] ?? 0))
     .filter((step) => step > OFF * least);
-  const step = stepOf(frames, distances, Math.min(...steps, Infinity));
+  const step = stepOf(frames, distances, smallest(steps));
   if (step === Infinity) return { frames, slices: frames.map(() => 0), count: 1 };
   const slices = distances.map((distance) => Math.round(distance / step));
   const count = (slices.at(-1) ?? 0) + 1;
@@ -43,7 +45,39 @@ function slicesOf(images: readonly Frame[]): Slices | undefined {
 function stepOf([first]: readonly Frame[], distances: readonly number[], least: number): number {
   const stated = Math.abs(first?.statedStep ?? 0);
   const fits = distances.every((distance) => Math.abs(distance / stated - Math.round(distance / stated)) <= OFF);
-  return stated > 0 && least !== Infinity && fits ? stated : least;
+  // Frames at different positions are in different slices.
+  return least !== Infinity && fits && Math.round(least / stated) >= 1 ? stated : least;
+}
+
+/** Returns why the frames of a file are no volume of labels; undefined if they may be one. */
+function problemOf(images: readonly Frame[]): string | undefined {
+  const [first] = images as [Frame];
+  const { float, signed, bitsAllocated } = first.format;
+  if (float || (first.series.sopClass === LABEL_MAP && (signed || bitsAllocated > 16)))
+    return 'a segmentation whose labels are no unsigned integers of up to 16 bits';
+  if (!images.every((image) => isAlike(first, image)))
+    return 'a segmentation with frames of several orientations or pixel spacings';
+  return undefined;
+}
+
+/** Returns how many frames are at the position of another one with the same segment. */
+function repeatedIn({ frames, slices }: Slices): number {
+  return frames.length - new Set(frames.map(({ segment }, k) => `${segment} ${slices[k]}`)).size;
+}
+
+/** Returns what should be known of the segments of a volume. */
+function warningsOf(frames: Slices): string[] {
+  const [{ series }] = frames.frames as [Frame];
+  const repeated = repeatedIn(frames);
+  const texts = repeated > 0 ? [`${repeated} frames are at the position of another one of the same segment.`] : [];
+  if (series.sopClass === LABEL_MAP) return texts;
+  const unnamed = frames.frames.filter(({ segment }) => !segment).length;
+  if (unnamed > 0)
+    texts.push(`${unnamed} frames name no segment: their voxels have label ${labelOf(frames.frames[0] as Frame)}.`);
+  const described = new Set(series.segments.map(({ value }) => value));
+  const others = new Set(frames.frames.map(labelOf).filter((label) => !described.has(label)));
+  const labels = listed([...others].map(String));
+  return others.size > 0 ? [...texts, `Segments that the file does not describe: ${labels}.`] : texts;
 }
 
 /** A volume of labels. */
@@ -53,10 +87,13 @@ export class SegmentationVolume extends DicomVolume {
   readonly #slices: Slices;
   readonly #affine: number[];
 
-  /** Returns the volume of the frames of one file; undefined if they are at uneven distances. */
-  static of(parser: Parser, images: readonly Frame[]): SegmentationVolume | undefined {
+  /** Returns the volume of the frames of one file, or why they are none. */
+  static of(parser: Parser, images: readonly Frame[]): SegmentationVolume | string {
+    const problem = problemOf(images);
+    if (problem !== undefined) return problem;
     const slices = slicesOf(images);
-    return slices && new SegmentationVolume(parser, slices);
+    if (!slices) return 'a segmentation with frames at uneven distances';
+    return shiftOf(slices.frames) ?? new SegmentationVolume(parser, slices);
   }
 
   private constructor(parser: Parser, slices: Slices) {
@@ -68,7 +105,7 @@ export class SegmentationVolume extends DicomVolume {
       spacing: spacingOf(affine),
       frames: 1,
       images: frames.length,
-      warnings: [],
+      warnings: warningsOf(slices).map(reader),
       remarks: [],
       uneven: undefined,
     });
@@ -82,11 +119,10 @@ export class SegmentationVolume extends DicomVolume {
     const [nx, ny, nz] = this.dims;
     const [first] = frames as [Frame];
     const { wholeFraction, sopClass } = first.series;
-    const data = allocated(
-      first.format.bitsAllocated > 8 || this.segments.some(({ value }) => value > 255) ? Uint16Array : Uint8Array,
-      nx * ny * nz,
-    );
-    const best = wholeFraction > 0 ? allocated(Uint8Array, data.length) : undefined;
+    const isWide = first.format.bitsAllocated > 8 || frames.some((frame) => labelOf(frame) > 255);
+    const Kind = isWide || this.segments.some(({ value }) => value > 255) ? Uint16Array : Uint8Array;
+    const data = allocated(Kind, nx * ny * nz, frames);
+    const best = wholeFraction > 0 ? allocated(arrayOf(first.format), data.length, frames) : undefined;
     const pixels = new PixelReader(this.#parser, reading.decoders);
     // A voxel of several segments gets the one that comes last in the file.
     const order = frames.map((_, k) => k).toSorted((a, b) => (frames[a]?.segment ?? 0) - (frames[b]?.segment ?? 0));
@@ -97,8 +133,8 @@ export class SegmentationVolume extends DicomVolume {
         const values = await pixels.read(frame);
         const at = (slices[k] ?? 0) * nx * ny;
         if (sopClass === LABEL_MAP) data.set(values, at);
-        else if (best) takeFractions(data, best, values, at, frame.segment ?? 1, wholeFraction);
-        else shared += takeSegment(data, values, at, frame.segment ?? 1);
+        else if (best) takeFractions(data, best, values, at, labelOf(frame), wholeFraction);
+        else shared += takeSegment(data, values, at, labelOf(frame));
         reading.onProgress?.({ done: done + 1, total: order.length });
         await pause.turn();
       }
@@ -110,9 +146,15 @@ export class SegmentationVolume extends DicomVolume {
       affine: this.#affine,
       space: 'LPS',
       unit: 'mm',
-      ...(shared > 0 && { warnings: [reader(text)] }),
+      ...withWarnings([...this.warnings, ...(shared > 0 ? [reader(text)] : [])]),
     };
   }
+}
+
+/** Returns the label of the voxels of a frame: the number of its segment, or of the only one. */
+function labelOf({ segment, series }: Frame): number {
+  if (segment) return segment;
+  return series.segments.length === 1 ? (series.segments[0]?.value ?? 1) : 1;
 }
 
 /** Gives the voxels of a frame the label of its segment; returns how many had another. */

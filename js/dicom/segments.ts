@@ -1,20 +1,27 @@
 // The segments of DICOM segmentations (PS3.3, C.8.20.2 and C.8.20.4).
 import type { DataSet } from 'dicom-parser';
-import { textOf } from './elements.js';
+import { shortened } from '../short-text.js';
+import { integerOf, textOf } from './elements.js';
 import type { Segment } from './types.js';
 
 /** Classes of segmentations: with one frame for each segment and slice, and with the label of each voxel. */
 export const SEGMENTATION = '1.2.840.10008.5.1.4.1.1.66.4';
 export const LABEL_MAP = '1.2.840.10008.5.1.4.1.1.66.7';
 
-/** Returns the segments that a file describes; none if it is no segmentation. */
+/** Returns the segments that a file describes, the first of each number; none if it is no segmentation. */
 export function segmentsOf(data: DataSet): Segment[] {
+  const segments = new Map<number, Segment>();
+  for (const segment of describedIn(data)) if (!segments.has(segment.value)) segments.set(segment.value, segment);
+  return [...segments.values()];
+}
+
+function describedIn(data: DataSet): Segment[] {
   const items = data.elements.x00620002?.items ?? [];
   return items.flatMap(({ dataSet }) => {
-    const value = dataSet?.uint16('x00620004');
+    const value = integerOf(dataSet, 'x00620004');
     // The background of a label map is described like a segment.
     if (!dataSet || value === undefined || value === 0) return [];
-    const name = textOf(dataSet, 'x00620005') || textOf(dataSet, 'x00620006');
+    const name = shortened(textOf(dataSet, 'x00620005', data) || textOf(dataSet, 'x00620006', data));
     const color = colorOf(dataSet);
     return [{ value, ...(name && { name }), ...(color && { color }) }];
   });
@@ -22,7 +29,7 @@ export function segmentsOf(data: DataSet): Segment[] {
 
 /** Returns the stored value that stands for a whole voxel; 0 for segmentations that have no fractions. */
 export function wholeFractionOf(data: DataSet): number {
-  return textOf(data, 'x00620001') === 'FRACTIONAL' ? (data.uint16('x0062000e') ?? 255) : 0;
+  return textOf(data, 'x00620001') === 'FRACTIONAL' ? (integerOf(data, 'x0062000e') ?? 255) : 0;
 }
 
 /**
@@ -30,7 +37,7 @@ export function wholeFractionOf(data: DataSet): number {
  * dcmjs, which write nearly all of these files, where the standard has D50: colours differ by 3 of 255.
  */
 function colorOf(data: DataSet): string | undefined {
-  const [l, a, b] = [0, 1, 2].map((k) => data.uint16('x0062000d', k));
+  const [l, a, b] = [0, 1, 2].map((k) => integerOf(data, 'x0062000d', k));
   if (l === undefined || a === undefined || b === undefined) return undefined;
   return rgbOf((l / 65535) * 100, (a / 65535) * 255 - 128, (b / 65535) * 255 - 128);
 }

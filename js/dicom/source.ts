@@ -10,7 +10,9 @@ export class Source {
   constructor(name: string, content: Uint8Array | Blob) {
     this.name = name;
     this.size = content instanceof Uint8Array ? content.length : content.size;
-    this.#content = content;
+    // A view of class Uint8Array: slices of Node's buffers are no copies.
+    this.#content =
+      content instanceof Uint8Array ? new Uint8Array(content.buffer, content.byteOffset, content.length) : content;
   }
 
   /** Returns the bytes from `start` to `end`, excluded, or as many of them as the file has. */

@@ -1,4 +1,5 @@
 // Seconds between the frames of a volume with time.
+import { largest, smallest } from './geometry.js';
 import type { Frame } from './types.js';
 
 /** Largest relative difference of times between frames that count as equal. */
@@ -20,9 +21,9 @@ export function secondsOf(frames: readonly (readonly Frame[])[]): { seconds?: nu
       .map((slices) => slices[0]?.marks[mark])
       .map((value) => (typeof value === 'string' ? ofDay(value) : (value ?? Number.NaN) * unit));
     const steps = times.slice(1).map((time, k) => time - (times[k] ?? 0));
-    if (!steps.every((step) => step > 0)) continue;
+    if (!steps.every((step) => step > 0 && step < Infinity)) continue;
     const seconds = Number((steps.reduce((sum, step) => sum + step, 0) / steps.length).toPrecision(9));
-    const [least, most] = [Math.min(...steps), Math.max(...steps)];
+    const [least, most] = [smallest(steps), largest(steps)];
     if (most - least <= EVEN * seconds) return { seconds };
     const range = [least, most].map((step) => Number(step.toPrecision(3))).join(' to ');
     return { seconds, note: `Times between frames differ (${range} s); their mean is used.` };

@@ -23,8 +23,9 @@ export interface Frame {
   /** Number of the frame in its file, and of all frames there. */
   index: number;
   count: number;
-  /** Byte at which the value of the pixel data begins. */
+  /** Byte at which the value of the pixel data begins, and the one after its end. */
   pixelsAt: number;
+  pixelsEnd: number;
   /** Whether the dataset is compressed as a whole, so that offsets are those of the inflated file. */
   deflated: boolean;
   format: PixelFormat;

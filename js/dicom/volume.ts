@@ -3,6 +3,7 @@ import { checkProperties, choice } from '../check.js';
 import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
 import { withPause } from '../pause.js';
+import { shortened } from '../short-text.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import type { Warning } from '../warning.js';
 import type { Decoders } from './codecs.js';
@@ -34,6 +35,9 @@ export interface DicomReadOptions {
   /** Called after each image that has been read. */
   onProgress?: (progress: DicomProgress) => void;
 }
+
+/** Most characters of the name of a volume, to which its size and a number may be added. */
+const LONGEST_NAME = 150;
 
 const OPTIONS = ['uneven', 'decoders', 'signal', 'onProgress'];
 
@@ -81,7 +85,7 @@ export abstract class DicomVolume {
     const named =
       series.description ||
       [series.modality, series.number].filter((part) => part !== undefined && part !== '').join(' ');
-    this.name = [named || 'DICOM', label].filter(Boolean).join(', ');
+    this.name = shortened([named || 'DICOM', label].filter(Boolean).join(', '), LONGEST_NAME);
     this.patient = series.patient;
     this.modality = series.modality;
     this.date = series.date;
@@ -139,8 +143,23 @@ function remarksOn({ units, padding, inverted }: Series): string[] {
 
 export const reader = (text: string): Warning => ({ code: 'reader', text });
 
-/** Returns an array of voxels; throws `too-large` if there is no memory for it. */
-export function allocated(Kind: new (length: number) => VoxelArray, length: number): VoxelArray {
+/** Bytes that a volume may have, however few its files have, and for each byte of these. */
+const FREE_BYTES = 2 ** 29;
+const BYTES_PER_BYTE = 5000;
+
+/** Returns an array of voxels; throws `too-large` if there is no memory for it, or its files cannot hold so many. */
+export function allocated(
+  Kind: new (length: number) => VoxelArray,
+  length: number,
+  frames: readonly Frame[],
+): VoxelArray {
+  const stored = [...new Set(frames.map(({ file }) => file))].reduce((sum, { size }) => sum + size, 0);
+  const bytes = length * new Kind(0).BYTES_PER_ELEMENT;
+  if (bytes > Math.max(FREE_BYTES, BYTES_PER_BYTE * stored))
+    throw new VesicleError(
+      'too-large',
+      `DICOM: voxels: ${bytes} bytes are more than ${stored} bytes of files can hold`,
+    );
   try {
     return new Kind(length);
   } catch {
@@ -187,13 +206,12 @@ export class ImageVolume extends DicomVolume {
 
   protected override async readVoxels(reading: Reading): Promise<VolumeInit> {
     const { frames } = this.#stack;
-    const [first] = frames.flat() as [Frame];
-    const isOneScale = frames
-      .flat()
-      .every(({ slope, intercept }) => slope === first.slope && intercept === first.intercept);
+    const images = frames.flat();
+    const [first] = images as [Frame];
+    const isOneScale = images.every(({ slope, intercept }) => slope === first.slope && intercept === first.intercept);
     const Kind = isOneScale ? arrayOf(first.format) : first.format.bitsAllocated > 16 ? Float64Array : Float32Array;
     const [nx, ny, nz] = this.dims;
-    const data = allocated(Kind, nx * ny * nz * frames.length);
+    const data = allocated(Kind, nx * ny * nz * frames.length, images);
     const pixels = new PixelReader(this.#parser, reading.decoders);
     const progress = { done: 0, total: this.images };
     await withPause(reading.signal, async (pause) => {
@@ -222,7 +240,7 @@ export class ImageVolume extends DicomVolume {
   }
 }
 
-const withWarnings = (warnings: Warning[]) => (warnings.length > 0 ? { warnings } : {});
+export const withWarnings = (warnings: Warning[]) => (warnings.length > 0 ? { warnings } : {});
 
 /** Returns warnings about compressed images, which are known once they are read. */
 function foundIn({ lossy, endless }: PixelReader, series: Series): Warning[] {

@@ -31,6 +31,13 @@ export function pageBytes(format: Format): number {
   return format.height * rowBytes(format, format.width) * (format.isPlanar ? format.samples : 1);
 }
 
+/** Returns the number of bytes of all blocks of a page that one slice needs, once they are decompressed. */
+export function decodedBytes(format: Format): number {
+  const { block, width, height } = format;
+  const rows = block.isTile ? Math.ceil(height / block.height) * block.height : height;
+  return Math.ceil(width / block.width) * rowBytes(format, block.width) * rows;
+}
+
 /**
  * Returns the blocks of a page with the samples from `sample` on. With `part` > 0 they are those of the image that comes
  * `part` images after it in the same format, without a directory of its own.
@@ -57,8 +64,15 @@ async function storedBlocks(page: Page, format: Format, sample: number): Promise
   return Array.from({ length: wide * high }, (_, k) => {
     const y = Math.floor(k / wide) * block.height;
     const rows = block.isTile ? block.height : Math.min(block.height, height - y);
-    const found = { at: offsets[before + k] ?? 0, x: (k % wide) * block.width, y, width: block.width, height: rows };
-    const bytes = bytesOf(format, found, counts[before + k]);
+    const found = {
+      at: page.checked(atTag, offsets[before + k] ?? 0),
+      x: (k % wide) * block.width,
+      y,
+      width: block.width,
+      height: rows,
+    };
+    const counted = counts[before + k];
+    const bytes = bytesOf(format, found, counted === undefined ? undefined : page.checked(bytesTag, counted));
     if (bytes === undefined) throw badTiff(page.label, `offset or number of bytes of ${name} is missing`);
     return { ...found, bytes };
   });

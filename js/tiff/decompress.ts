@@ -8,7 +8,7 @@ import { lzw } from './lzw.js';
 type Bytes = Uint8Array<ArrayBuffer>;
 
 /** Most bytes in a block of Zstandard: the decoder does not notice when its memory is full. */
-const LARGEST_ZSTANDARD = 2 ** 29;
+const LARGEST_ZSTANDARD = 2 ** 28;
 
 /** Size of what a block holds. */
 export interface BlockSize {

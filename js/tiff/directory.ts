@@ -1,6 +1,7 @@
 // The directories of a TIFF file: the tags of its pages.
 
 import type { Pause } from '../pause.js';
+import { shortened } from '../short-text.js';
 import { badTiff } from './error.js';
 import type { Source } from './source.js';
 
@@ -140,7 +141,7 @@ export class Page {
 
   /** Name for messages: that of the file, and the number of the page from 1. */
   get label(): string {
-    return `${this.source.name}: page ${this.#index + 1}`;
+    return `${shortened(this.source.name)}: page ${this.#index + 1}`;
   }
 
   /** Returns whether the directory, or a value of a tag, begins in a part of the file. */
@@ -188,6 +189,17 @@ export class Page {
   /** Returns the first value of a tag, or `missing`. */
   async number(tag: number, missing: number): Promise<number> {
     return (await this.numbers(tag, 1))[0] ?? missing;
+  }
+
+  /** Returns the first value of a tag, or `missing`; throws `bad-file` unless it is a whole number, 0 or larger. */
+  async integer(tag: number, missing: number): Promise<number> {
+    return this.checked(tag, await this.number(tag, missing));
+  }
+
+  /** Returns a value of a tag; throws `bad-file` unless it is a whole number, 0 or larger. */
+  checked(tag: number, value: number): number {
+    if (Number.isSafeInteger(value) && value >= 0) return value;
+    throw badTiff(this.label, `tag ${tag} must be a whole number, got ${value}`);
   }
 
   /** Returns the text of a tag up to its end, or to the first zero. */

@@ -1,17 +1,24 @@
 // Errors of TIFF files, and the package that decodes some of them.
 import { invalid } from '../check.js';
 import { VesicleError } from '../error.js';
+import { shortened } from '../short-text.js';
+
+/** Most characters of the name of a part, with the number of a page, and of what a message says of it. */
+const [LONGEST_PART, LONGEST_PROBLEM] = [250, 1000];
+
+const message = (part: string, problem: string) =>
+  `TIFF: ${shortened(part, LONGEST_PART)}: ${shortened(problem, LONGEST_PROBLEM)}`;
 
 /**
  * Returns the `bad-file` error whose message names the file, or the page in it, and its problem; the caller throws it.
  */
 export function badTiff(part: string, problem: string): VesicleError {
-  return new VesicleError('bad-file', `TIFF: ${part}: ${problem}`);
+  return new VesicleError('bad-file', message(part, problem));
 }
 
 /** Returns the `too-large` error about a part of a file; the caller throws it. */
 export function tooLarge(part: string, problem: string): VesicleError {
-  return new VesicleError('too-large', `TIFF: ${part}: ${problem}`);
+  return new VesicleError('too-large', message(part, problem));
 }
 
 /** The package that decodes JPEG and Zstandard. */

@@ -98,37 +98,36 @@ export async function sizeOf(page: Page): Promise<{ width: number; height: numbe
 /** Reads how the image of a page is stored; throws `bad-file` if it is not supported. */
 export async function formatOf(page: Page): Promise<Format> {
   const size = await sizeOf(page);
-  const samples = await page.number(TAG.samples, 1);
+  const samples = await page.integer(TAG.samples, 1);
   if (samples < 1 || samples > 65_535) throw badTiff(page.label, `SamplesPerPixel must be 1 to 65535, got ${samples}`);
   const type = await sampleType(page);
   const compression = await compressionOf(page);
   if (compression === 'JPEG' && (type.bits !== 8 || type.kind !== 'unsigned'))
     throw badTiff(page.label, `samples in JPEG must be unsigned, 8 bits, got ${type.kind}, ${type.bits} bits`);
   const predictor = await predictorOf(page, compression, type);
-  const planar = await page.number(TAG.planar, 1);
+  const planar = await page.integer(TAG.planar, 1);
   if (planar !== 1 && planar !== 2) throw badTiff(page.label, `PlanarConfiguration must be 1 or 2, got ${planar}`);
   return {
     ...size,
     ...{ samples, type, compression, predictor, ratio: RATIOS[compression] },
     isPlanar: planar === 2 && samples > 1,
-    photometric: await page.number(TAG.photometric, PHOTOMETRIC.blackIsZero),
-    isReversed: (await page.number(TAG.fillOrder, 1)) === 2,
+    photometric: await page.integer(TAG.photometric, PHOTOMETRIC.blackIsZero),
+    isReversed: (await page.integer(TAG.fillOrder, 1)) === 2,
     block: await blockOf(page, size),
   };
 }
 
 async function sampleType(page: Page): Promise<SampleType> {
-  const [bits = 1, ...others] = await page.numbers(TAG.bits);
-  if (others.some((other) => other !== bits))
-    throw badTiff(
-      page.label,
-      `all samples must have the same number of bits, got ${[bits, ...others].slice(0, 8).join(', ')}`,
-    );
+  const found = await page.numbers(TAG.bits);
+  const bits = page.checked(TAG.bits, found[0] ?? 1);
+  if (found.some((other) => other !== bits))
+    throw badTiff(page.label, `all samples must have the same number of bits, got ${found.slice(0, 8).join(', ')}`);
   const formats = new Set(await page.numbers(TAG.sampleFormat));
   const [format = 1] = formats;
   const kind = FORMATS[format];
   if (format === 5 || format === 6) throw badTiff(page.label, 'complex numbers are not supported');
-  if (formats.size > 1 || !kind) throw badTiff(page.label, `unsupported SampleFormat ${[...formats].join(', ')}`);
+  if (formats.size > 1 || !kind)
+    throw badTiff(page.label, `unsupported SampleFormat ${[...formats].slice(0, 8).join(', ')}`);
   // Readers disagree about the order of three bytes.
   const isInteger = (bits >= 1 && bits <= 32 && bits !== 24) || bits === 64;
   if (kind === 'float' ? [16, 32, 64].includes(bits) : isInteger) return { kind, bits };
@@ -138,14 +137,14 @@ async function sampleType(page: Page): Promise<SampleType> {
 }
 
 async function compressionOf(page: Page): Promise<Compression> {
-  const number = await page.number(TAG.compression, 1);
+  const number = await page.integer(TAG.compression, 1);
   const name = COMPRESSIONS[number] ?? `number ${number}`;
   if (Object.hasOwn(RATIOS, name)) return name as Compression;
   throw badTiff(page.label, `unsupported compression ${name}; supported: ${Object.keys(RATIOS).join(', ')}`);
 }
 
 async function predictorOf(page: Page, compression: Compression, { kind, bits }: SampleType): Promise<1 | 2 | 3> {
-  const predictor = await page.number(TAG.predictor, 1);
+  const predictor = await page.integer(TAG.predictor, 1);
   if (predictor === 1) return 1;
   const isKnown =
     (predictor === 2 && [8, 16, 32, 64].includes(bits)) || (predictor === 3 && kind === 'float' && bits <= 64);
@@ -155,10 +154,10 @@ async function predictorOf(page: Page, compression: Compression, { kind, bits }:
 
 async function blockOf(page: Page, { width, height }: { width: number; height: number }): Promise<Format['block']> {
   if (!page.has(TAG.tileWidth) || page.has(TAG.stripOffsets)) {
-    const rows = await page.number(TAG.rowsPerStrip, height);
+    const rows = await page.integer(TAG.rowsPerStrip, height);
     return { width, height: rows > 0 ? Math.min(rows, height) : height, isTile: false };
   }
-  const tile = { width: await page.number(TAG.tileWidth, 0), height: await page.number(TAG.tileHeight, 0) };
+  const tile = { width: await page.integer(TAG.tileWidth, 0), height: await page.integer(TAG.tileHeight, 0) };
   if (tile.width > 0 && tile.height > 0) return { ...tile, isTile: true };
   throw badTiff(page.label, `tiles must have a size, got ${tile.width} × ${tile.height}`);
 }

@@ -1,23 +1,31 @@
 // Sizes that compressed blocks state.
 
-/** Returns the size in the header of a JPEG; undefined if it has not exactly one. */
+/** Marker of the header in JPEG-LS. */
+const LS = 0xf7;
+
+/** Marker of a scan, and how many there may be: decoders go through the whole image for each, of which it has some ten. */
+const [SCAN, MOST_SCANS] = [0xda, 100];
+
+/** Returns the size in the header of a JPEG; undefined if it has not exactly one, or very many scans. */
 export function jpegSize(
   bytes: Uint8Array,
 ): { width: number; height: number; samples: number; bits: number } | undefined {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const found: { width: number; height: number; samples: number; bits: number }[] = [];
+  let scans = 0;
   // Markers without a length, and bytes of the image between them, are passed over.
   for (let at = 0; at + 9 < bytes.length; ) {
     const marker = bytes[at] === 0xff ? (bytes[at + 1] ?? 0) : 0;
-    const isFrame = marker >= 0xc0 && marker <= 0xcf && ![0xc4, 0xc8, 0xcc].includes(marker);
+    const isFrame = marker === LS || (marker >= 0xc0 && marker <= 0xcf && ![0xc4, 0xc8, 0xcc].includes(marker));
     if (isFrame) {
       const [bits, height, width] = [view.getUint8(at + 4), view.getUint16(at + 5), view.getUint16(at + 7)];
       found.push({ bits, height, width, samples: view.getUint8(at + 9) });
     }
+    if (marker === SCAN) scans += 1;
     const hasLength = marker >= 0xc0 && marker < 0xff && !(marker >= 0xd0 && marker <= 0xd9);
     at += hasLength ? 2 + view.getUint16(at + 2) : 1;
   }
-  return found.length === 1 ? found[0] : undefined;
+  return found.length === 1 && scans <= MOST_SCANS ? found[0] : undefined;
 }
 
 /** Number at the start of a frame of Zstandard. */

@@ -47,14 +47,18 @@ export function parseImageJ(text: string): ImageJ {
 }
 
 /** Axes of SCIFIO. */
-const AXES: Record<string, 'Z' | 'C' | 'T'> = { Z: 'Z', Channel: 'C', Time: 'T' };
+const AXES = new Map([
+  ['Z', 'Z'],
+  ['Channel', 'C'],
+  ['Time', 'T'],
+] as const);
 
 /** Returns the numbers, order and sizes that SCIFIO states; nothing if it states none. */
 function scifioIn(lines: Map<string, string>): Pick<ImageJ, 'sizes' | 'order' | 'axes'> | undefined {
   const [names = [], lengths = [], scales = [], units = []] = ['axes', 'lengths', 'scales', 'units'].map((name) =>
     lines.get(name)?.split(','),
   );
-  const outer = names.slice(2).map((name) => AXES[name]);
+  const outer = names.slice(2).map((name) => AXES.get(name as 'Z'));
   const isKnown = names[0] === 'X' && names[1] === 'Y' && outer.every((axis) => axis !== undefined);
   if (!isKnown || !lines.has('SCIFIO') || lengths.length !== names.length) return undefined;
   const sizes = { Z: 1, C: 1, T: 1 };

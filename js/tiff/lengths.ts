@@ -1,5 +1,6 @@
 // Lengths and times in the units of descriptions.
 import type { LengthUnit, Vec3 } from '../data.js';
+import { shortened } from '../short-text.js';
 
 /** Micrometres in each unit of length, by the names that OME and ImageJ have for it. */
 const MICROMETRES = named({
@@ -42,10 +43,13 @@ const plain = (name: string) => name.trim().replace(/^(\\u00B5|[µμ])/i, 'u');
 /** Returns the seconds in a unit of time; undefined if it is not known. */
 export const secondsIn = (name: string): number | undefined => SECONDS.get(plain(name));
 
-/** Returns the number that is written in a description; undefined if it is not above 0 and finite. */
+/** Bounds of sizes and numbers in descriptions: beyond them, sizes in another unit would be 0 or infinite. */
+const [LEAST, MOST] = [1e-25, 1e25];
+
+/** Returns the number that is written in a description; undefined if it is not above 0, or absurd. */
 export function positive(text: string | undefined): number | undefined {
   const value = text?.trim() ? Number(text) : Number.NaN;
-  return Number.isFinite(value) && value > 0 ? value : undefined;
+  return value >= LEAST && value <= MOST ? value : undefined;
 }
 
 /** The size of voxels along an axis as it is stated. */
@@ -74,7 +78,9 @@ export function spacingOf(axes: Stated[], slices: number): Spacing {
   const scale = scales.find((known) => known !== undefined);
   if (scale === undefined) return { spacing: raw, assumed: [] };
   if (isStated.some((stated, k) => stated && scales[k] === undefined)) {
-    const list = axes.map(({ size, unit }) => (size === undefined ? 'none' : `${size} ${unit}`)).join(', ');
+    const list = axes
+      .map(({ size, unit }) => (size === undefined ? 'none' : `${size} ${shortened(unit, 50)}`))
+      .join(', ');
     return { spacing: raw, assumed: [`voxel sizes along x, y, z are ${list}: they are used without a unit`] };
   }
   const [unit, base] =

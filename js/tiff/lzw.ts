@@ -14,6 +14,10 @@ class Strings {
     for (let code = 0; code < CLEAR; code++) [this.#last[code], this.#length[code]] = [code, 1];
   }
 
+  clear(): void {
+    this.next = END + 1;
+  }
+
   add(before: number, last: number): void {
     if (this.next >= 1 << MOST_BITS) return;
     this.#before[this.next] = before;
@@ -41,20 +45,23 @@ class Strings {
   }
 }
 
+/** The table of the block that is being decoded: blocks may be shorter than it. */
+const strings = new Strings();
+
 /** Decodes at most `size` bytes; fewer if the codes end before. */
 export function lzw(stored: Uint8Array, size: number): Uint8Array<ArrayBuffer> {
   if (stored[0] === 0 && ((stored[1] ?? 0) & 1) === 1)
     throw new Error('codes with the lowest bit first, as of TIFF 5, are not supported');
   const out = new Uint8Array(size);
   let length = 0;
-  let strings = new Strings();
+  strings.clear();
   let [bits, before] = [FIRST_BITS, -1];
   for (let at = 0; length < size && at + bits <= 8 * stored.length; ) {
     const code = codeAt(stored, at, bits);
     at += bits;
     if (code === END) break;
     if (code === CLEAR) {
-      if (strings.next > END + 1) strings = new Strings();
+      strings.clear();
       [bits, before] = [FIRST_BITS, -1];
       continue;
     }

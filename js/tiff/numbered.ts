@@ -23,7 +23,7 @@ function hasOtherWords(first: string[], parts: string[]): boolean {
 function warningOfGaps(unordered: number[]): string | undefined {
   const numbers = unordered.toSorted((a, b) => a - b);
   const steps = numbers.slice(1).map((number, k) => number - (numbers[k] as number));
-  const step = Math.min(...steps.filter((step) => step > 0));
+  const step = steps.reduce((least, step) => (step > 0 ? Math.min(least, step) : least), Infinity);
   const gap = steps.findIndex((other) => other > step);
   if (gap < 0) return;
   const count = steps.filter((other) => other > step).length;

@@ -1,6 +1,7 @@
 // Which pages of an OME-TIFF, of one or several files, are which slices.
 
 import type { Pause } from '../pause.js';
+import { shortened } from '../short-text.js';
 import type { Page } from './directory.js';
 import { badTiff } from './error.js';
 import { type Format, formatOf, PHOTOMETRIC } from './format.js';
@@ -22,6 +23,9 @@ import type { Part } from './planes.js';
 /** Photometric interpretations whose samples may be channels. */
 const CHANNELS: number[] = [PHOTOMETRIC.whiteIsZero, PHOTOMETRIC.blackIsZero, PHOTOMETRIC.rgb];
 
+/** Most characters of the name of a channel, to which the number of a sample may be added. */
+const LONGEST_CHANNEL = 180;
+
 /** Position of a page. */
 type Place = { z: number; c: number; t: number };
 
@@ -34,7 +38,7 @@ export async function omeStack(main: OmeFile, ome: Ome, files: OmeFile[], pause:
     await placing.place(pause);
     if (placing.isEmpty) continue;
     const others = ome.images.length - 1;
-    const name = image.name ? ` ("${image.name}")` : '';
+    const name = image.name ? ` ("${shortened(image.name)}")` : '';
     const several = others > 0 ? [`the file has ${others + 1} images: number ${k + 1}${name} is read`] : [];
     return placing.layout([...several, ...(others > 0 ? [] : placing.unplaced())]);
   }
@@ -210,7 +214,8 @@ class Placing {
   }
 
   #nameOf(c: number): string {
-    return this.#image.channels[this.#image.channels.length === this.#sizes.C ? c : -1] || `channel ${c + 1}`;
+    const name = this.#image.channels[this.#image.channels.length === this.#sizes.C ? c : -1];
+    return name ? shortened(name, LONGEST_CHANNEL) : `channel ${c + 1}`;
   }
 
   #firstMissing(c: number): string {
@@ -221,7 +226,7 @@ class Placing {
 
   #missing(c: number, z: number, t: number): string {
     const file = this.#absent.get(c);
-    const hint = file ? `: the file "${file}" of the data set was not opened` : '';
+    const hint = file ? `: the file "${shortened(file)}" of the data set was not opened` : '';
     return `slice ${z + 1} of frame ${t + 1} of ${this.#nameOf(c)} is missing${hint}`;
   }
 
@@ -245,19 +250,19 @@ class Placing {
     const names: string[] = [];
     for (let c = 0; c < C && names.length < 10; c++) {
       const file = this.#absent.get(c);
-      if (!this.#channels.has(c)) names.push(`${this.#nameOf(c)}${file ? ` (in "${file}")` : ''}`);
+      if (!this.#channels.has(c)) names.push(`${this.#nameOf(c)}${file ? ` (in "${shortened(file, 50)}")` : ''}`);
     }
     return [`${C - this.#channels.size} of ${C} channels are not in the files that were opened: ${names.join(', ')}`];
   }
 }
 
 /** Names of the types in OME's XML. */
-const KINDS: Record<string, Format['type']['kind']> = {
-  int: 'signed',
-  uint: 'unsigned',
-  float: 'float',
-  double: 'float',
-};
+const KINDS = new Map<string, Format['type']['kind']>([
+  ['int', 'signed'],
+  ['uint', 'unsigned'],
+  ['float', 'float'],
+  ['double', 'float'],
+]);
 
 /** Returns warnings about what pages are, and the description says otherwise. */
 function contradictions({ sizes, type }: OmeImage, format: Format): string[] {
@@ -267,8 +272,10 @@ function contradictions({ sizes, type }: OmeImage, format: Format): string[] {
     const described = `${sizes.X} × ${sizes.Y} pixels are described`;
     found.push(`${described}, the pages have ${format.width} × ${format.height}: voxel sizes may be wrong`);
   }
-  const kind = KINDS[/^[a-z]+/.exec(type)?.[0] ?? ''];
+  const kind = KINDS.get(/^[a-z]+/.exec(type)?.[0] ?? '');
   if (kind && kind !== format.type.kind)
-    found.push(`the described type is ${type}, but samples are read as ${format.type.kind}, as the pages say`);
+    found.push(
+      `the described type is ${shortened(type, 50)}, but samples are read as ${format.type.kind}, as the pages say`,
+    );
   return found;
 }

@@ -1,6 +1,7 @@
 // Opens the files of a stack.
 
 import type { Pause } from '../pause.js';
+import { shortened } from '../short-text.js';
 import { isTiff, readPages, TAG } from './directory.js';
 import { badTiff } from './error.js';
 import { type Channel, type Layout, type OpenFile, stackOf } from './layout.js';
@@ -12,6 +13,9 @@ import type { Source } from './source.js';
 
 /** Largest number of bytes of a file that is only a description. */
 const LARGEST_TEXT = 2 ** 28;
+
+/** Most channels of all files that are joined. */
+const MOST_JOINED = 2 ** 19;
 
 /** Opens the stack in one or several files: those of one data set, or one or several slices a file. */
 export async function openStack(sources: Source[], pause: Pause): Promise<Layout> {
@@ -25,7 +29,7 @@ export async function openStack(sources: Source[], pause: Pause): Promise<Layout
   const others = files.filter((file) => !named.has(file));
   if (others.length === 0) return omeStack(main, main.ome, files, pause);
   if (named.size > 1 || main.pages.length === 0)
-    throw badTiff(others[0]?.source.name ?? '', `not one of the files that "${main.source.name}" describes`);
+    throw badTiff(others[0]?.source.name ?? '', `not one of the files that "${shortened(main.source.name)}" describes`);
   // Files that describe only themselves.
   return joined(files, (file) => (file.ome ? omeStack(file, file.ome, [file], pause) : stackOf(file, pause)));
 }
@@ -51,7 +55,10 @@ function checkDescribed(files: OmeFile[], main: OmeFile | undefined): void {
   if (main) return;
   const lost = files.find(({ ome }) => ome?.elsewhere !== undefined);
   if (lost)
-    throw badTiff(lost.source.name, `described by the file "${lost.ome?.elsewhere}", which has to be opened with it`);
+    throw badTiff(
+      lost.source.name,
+      `described by the file "${shortened(lost.ome?.elsewhere ?? '')}", which has to be opened with it`,
+    );
   const empty = files.find(({ ome }) => ome);
   if (empty) throw badTiff(empty.source.name, 'its OME description has no image');
 }
@@ -59,7 +66,13 @@ function checkDescribed(files: OmeFile[], main: OmeFile | undefined): void {
 /** Returns the stack of files whose slices follow each other, in their order. */
 async function joined(files: OpenFile[], stackIn: (file: OpenFile & OmeFile) => Promise<Layout>): Promise<Layout> {
   const parts: Layout[] = [];
-  for (const file of files as OmeFile[]) parts.push(await stackIn(file));
+  let channels = 0;
+  for (const file of files as OmeFile[]) {
+    const part = await stackIn(file);
+    parts.push(part);
+    channels += part.channels.length;
+    if (channels > MOST_JOINED) throw badTiff(file.source.name, 'too many channels in files that are joined');
+  }
   const [first, ...others] = parts;
   if (!first) throw badTiff('', 'no files');
   if (others.length === 0) return first;

@@ -4,7 +4,8 @@ import type { Pause } from '../pause.js';
 import { type Block, blocksOf, contiguous, rowBytes, samplesIn } from './blocks.js';
 import { Decompressor } from './decompress.js';
 import type { Page } from './directory.js';
-import type { Format } from './format.js';
+import { tooLarge } from './error.js';
+import { arrayOf, type Format } from './format.js';
 import { numbersOf, reverseBits } from './samples.js';
 
 /** The part of a page that is a slice: a sample, or the luminance of red, green and blue. */
@@ -21,8 +22,11 @@ export interface Plane {
 /** Weights of red, green and blue in the luminance, those of ITU-R BT.709, as for other volumes. */
 export const WEIGHTS = [0.2126, 0.7152, 0.0722] as const;
 
-/** Number of blocks that are decompressed at the same time. */
-const TOGETHER = 8;
+/** Number of blocks that are decompressed at the same time, and of their bytes, unless one has more. */
+const [TOGETHER, BYTES_TOGETHER] = [8, 2 ** 25];
+
+/** Most bytes of the numbers of a block that is compressed. */
+const LARGEST_BLOCK = 2 ** 29;
 
 /** An array that samples of a page are copied into, row by row. */
 interface Target {
@@ -35,6 +39,8 @@ export interface Listener {
   pause: Pause;
   /** Called with the fraction of the page that has been read. */
   progress(share: number): void;
+  /** Called with the number of bytes of strips or tiles of a page, before they are read. */
+  stored(bytes: number, page: Page): void;
   /** Called if a strip or tile is not stored. */
   missing(page: Page): void;
 }
@@ -86,6 +92,10 @@ class PageReader {
     const blocks = await blocksOf(page, this.#format, targets[0]?.sample ?? 0, after);
     const stored = blocks.filter(({ bytes }) => bytes > 0);
     if (stored.length < blocks.length) this.#listener.missing(page);
+    this.#listener.stored(
+      stored.reduce((sum, { bytes }) => sum + bytes, 0),
+      page,
+    );
     const groups = contiguous(stored);
     for (const [k, group] of groups.entries()) {
       await this.#group(group, targets);
@@ -98,25 +108,41 @@ class PageReader {
     const [start, end] = [group[0]?.at ?? 0, group.at(-1)];
     if (!end) return;
     const bytes = await this.#plane.page.source.read(start, end.at + end.bytes - start);
-    for (let first = 0; first < group.length; first += TOGETHER) {
-      const some = group.slice(first, first + TOGETHER);
+    const together = this.#together();
+    for (let first = 0; first < group.length; first += together) {
+      const some = group.slice(first, first + together);
       const parts = some.map((block) => bytes.subarray(block.at - start, block.at - start + block.bytes));
-      const values = await Promise.all(some.map((block, k) => this.#numbers(block, parts[k] ?? bytes)));
-      for (const [k, block] of some.entries()) this.#place(block, values[k] ?? new Uint8Array(), targets);
+      const found = await Promise.all(some.map((block, k) => this.#bytes(block, parts[k] ?? bytes)));
+      for (const [k, block] of some.entries())
+        this.#place(block, await this.#numbers(block, found[k] ?? new Uint8Array()), targets);
       await this.#listener.pause.turn();
     }
   }
 
-  async #numbers(block: Block, stored: Uint8Array<ArrayBuffer>): Promise<VoxelArray> {
-    const { width, height } = block;
-    const [format, { page }] = [this.#format, this.#plane];
+  /** Returns how many blocks are decompressed at the same time; throws `too-large` for one that is too large by itself. */
+  #together(): number {
+    const { block, type, compression } = this.#format;
+    const numbers = block.width * block.height * samplesIn(this.#format);
+    const bytes = numbers * new (arrayOf(type))(0).BYTES_PER_ELEMENT;
+    if (bytes > LARGEST_BLOCK && compression !== 'none')
+      throw tooLarge(this.#plane.page.label, `a compressed strip or tile has ${bytes} bytes; at most ${LARGEST_BLOCK}`);
+    return Math.min(TOGETHER, Math.max(1, Math.floor(BYTES_TOGETHER / bytes)));
+  }
+
+  /** Returns the bytes of a block once they are decompressed. */
+  #bytes({ width, height }: Block, stored: Uint8Array<ArrayBuffer>): Promise<Uint8Array<ArrayBuffer>> {
+    const format = this.#format;
     if (format.isReversed) reverseBits(stored);
-    const samples = samplesIn(format);
-    const size = { width, height, samples, bytes: height * rowBytes(format, width) };
-    const bytes = await this.#decompressor.decompress(stored, size);
-    const { type, predictor } = format;
-    const { isLittle, label } = page;
-    return numbersOf(bytes, { type, isLittle, predictor, label, row: width * samples, samples });
+    const size = { width, height, samples: samplesIn(format), bytes: height * rowBytes(format, width) };
+    return this.#decompressor.decompress(stored, size);
+  }
+
+  #numbers({ width }: Block, bytes: Uint8Array<ArrayBuffer>): Promise<VoxelArray> {
+    const { type, predictor } = this.#format;
+    const { isLittle, label } = this.#plane.page;
+    const samples = samplesIn(this.#format);
+    const storage = { type, isLittle, predictor, label, row: width * samples, samples };
+    return numbersOf(bytes, storage, this.#listener.pause);
   }
 
   /** Copies what of a block is inside the image. */

@@ -1,6 +1,7 @@
 // Turns the bytes of a block into numbers.
 
 import type { VoxelArray } from '../data.js';
+import type { Pause } from '../pause.js';
 import { badTiff } from './error.js';
 import { arrayOf, type SampleType } from './format.js';
 
@@ -29,10 +30,10 @@ export function reverseBits(bytes: Bytes): void {
 }
 
 /** Returns the numbers of a block, whose bytes are changed; 64-bit integers as doubles. */
-export function numbersOf(given: Bytes, storage: Storage): VoxelArray {
+export async function numbersOf(given: Bytes, storage: Storage, pause: Pause): Promise<VoxelArray> {
   const { type, predictor } = storage;
   const size = type.bits / 8;
-  if (![1, 2, 4, 8].includes(size)) return unpacked(given, storage);
+  if (![1, 2, 4, 8].includes(size)) return unpacked(given, storage, pause);
   // Views of numbers need an offset that is a multiple of their size.
   const bytes = given.byteOffset % size === 0 ? given : Uint8Array.from(given);
   if (predictor === 3) addPlanes(bytes, storage);
@@ -114,19 +115,47 @@ function exact(values: BigInt64Array | BigUint64Array, label: string): Float64Ar
 }
 
 /** Returns numbers that are not whole bytes: bits from the highest to the lowest, rows from whole bytes. */
-function unpacked(bytes: Bytes, { type, row }: Storage): VoxelArray {
+async function unpacked(bytes: Bytes, { type, row }: Storage, pause: Pause): Promise<VoxelArray> {
   const { bits, kind } = type;
   const stride = Math.ceil((row * bits) / 8);
   const rows = bytes.length / stride;
   const out = new (arrayOf(type))(rows * row);
-  const [half, whole] = [2 ** (bits - 1), 2 ** bits];
+  const together = Math.ceil(TOGETHER / row);
   for (let y = 0; y < rows; y++) {
-    for (let x = 0; x < row; x++) {
-      const value = bitsAt(bytes, 8 * y * stride + x * bits, bits);
-      out[y * row + x] = kind === 'signed' && value >= half ? value - whole : value;
-    }
+    if (bits <= SHORT) unpackShort(bytes, y * stride, out, y * row, row, bits);
+    else for (let x = 0; x < row; x++) out[y * row + x] = bitsAt(bytes, 8 * y * stride + x * bits, bits);
+    if (y % together === 0) await pause.turn();
   }
-  return out;
+  return kind === 'signed' ? withSigns(out, bits) : out;
+}
+
+/** Numbers that are unpacked at a time. */
+const TOGETHER = 2 ** 18;
+
+/** Most bits of a number that fit into 32 together with those of a byte. */
+const SHORT = 24;
+
+/** Unpacks `count` numbers of few bits each, from byte `at` on, to `start` and what follows. */
+function unpackShort(bytes: Bytes, at: number, out: VoxelArray, start: number, count: number, bits: number): void {
+  const mask = 2 ** bits - 1;
+  let [next, word, held] = [at, 0, 0];
+  for (let k = start; k < start + count; k++) {
+    for (; held < bits; held += 8) {
+      word = (word << 8) | (bytes[next] ?? 0);
+      next += 1;
+    }
+    held -= bits;
+    out[k] = (word >>> held) & mask;
+    word &= (1 << held) - 1;
+  }
+}
+
+/** Returns unsigned numbers of some bits as signed ones. */
+function withSigns(numbers: VoxelArray, bits: number): VoxelArray {
+  const [half, whole] = [2 ** (bits - 1), 2 ** bits];
+  // Numbers of up to 8, 16 or 32 bits are in arrays of signed ones, where large ones are negative by now.
+  for (let k = 0; k < numbers.length; k++) if ((numbers[k] ?? 0) >= half) numbers[k] = (numbers[k] ?? 0) - whole;
+  return numbers;
 }
 
 /** Returns the unsigned integer of some bits, up to 32. */

@@ -24,12 +24,14 @@ export class Source {
     this.#window = window;
     this.name = name;
     this.size = content instanceof Uint8Array ? content.byteLength : content.size;
-    this.#content = content;
+    // A view of class Uint8Array: slices of Node's buffers are no copies.
+    this.#content =
+      content instanceof Uint8Array ? new Uint8Array(content.buffer, content.byteOffset, content.length) : content;
   }
 
   /** Throws `bad-file` unless the file has the bytes from `at`, included, to `at + length`, excluded. */
   check(at: number, length: number): void {
-    if (at + length <= this.size) return;
+    if (Number.isSafeInteger(at) && at >= 0 && length >= 0 && at + length <= this.size) return;
     throw badTiff(this.name, `truncated: bytes ${at} to ${at + length} are needed, the file has ${this.size}`);
   }
 

@@ -2,13 +2,14 @@
 import { checkProperties, integer, invalid } from '../check.js';
 import type { LengthUnit, Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { type Pause, withPause } from '../pause.js';
+import { shortened } from '../short-text.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import type { Warning } from '../warning.js';
-import { pageBytes } from './blocks.js';
+import { decodedBytes } from './blocks.js';
 import { badTiff, tooLarge } from './error.js';
 import { arrayOf, type Format, formatOf } from './format.js';
 import type { Channel, Layout } from './layout.js';
-import { type Listener, type Plane, readPlane } from './planes.js';
+import { type Listener, type Plane, readPlane, WEIGHTS } from './planes.js';
 import type { Source } from './source.js';
 
 /** Options of reading a stack. */
@@ -34,6 +35,13 @@ const LARGEST = 2 ** 32;
 
 /** Bytes that a small file may stand for, whatever its size. */
 const SMALL = 2 ** 16;
+
+/** Bytes that a volume may have, however few its files have, and for each byte of these. */
+const FREE_BYTES = 2 ** 29;
+const BYTES_PER_BYTE = 5000;
+
+/** Times that the bytes of a file may be read for a volume: some writers store equal tiles once. */
+const MOST_TIMES = 16;
 
 const OPTIONS = ['channel', 'signal', 'onProgress'];
 
@@ -69,14 +77,14 @@ export class TiffStack {
 
   /** @internal */
   constructor(layout: Layout, [width, height]: [number, number], sources: Source[]) {
-    this.channels = layout.channels.map(({ name }) => ({ name }));
+    this.channels = layout.channels.map(({ name }) => ({ name: shortened(name) }));
     this.dims = [width, height, layout.slices];
     this.frames = layout.frames;
     this.spacing = [...layout.spacing];
     this.unit = layout.unit;
     this.frameSeconds = layout.frames > 1 ? layout.frameSeconds : undefined;
     this.warnings = layout.warnings.map(warning);
-    this.remarks = layout.remarks ?? [];
+    this.remarks = (layout.remarks ?? []).map((remark) => shortened(remark, LONGEST_TEXT));
     this.#layout = layout;
     this.#sources = sources;
   }
@@ -133,11 +141,12 @@ export class TiffStack {
       const format = known ?? shared(kinds, await formatOf(page));
       formats.set(page, format);
       if (!known) this.#checkAlike(page.label, format, formats.values().next().value ?? format);
-      bytes += pageBytes(format) / format.samples;
+      bytes += decodedBytes(format);
       ratio = Math.max(ratio, format.ratio);
       await pause.turn();
     }
     this.#checkSize(bytes, ratio);
+    this.#checkMemory(channel, formats);
     return formats;
   }
 
@@ -145,14 +154,37 @@ export class TiffStack {
     const shown = ({ width, height, type }: Format) => `${width} × ${height} pixels, ${type.kind}, ${type.bits} bits`;
     const [own, wanted] = [shown(format), shown(first)];
     if (own !== wanted) throw badTiff(label, `the image has ${own}, but the first one ${wanted}`);
+    const [width, height] = this.dims;
+    // Each channel may have its own type.
+    if (format.width !== width || format.height !== height)
+      throw badTiff(label, `the image has ${own}, but those of other channels ${width} × ${height} pixels`);
   }
 
   /** Throws `too-large` if the files cannot hold so many bytes, or a volume cannot. */
   #checkSize(bytes: number, ratio: number): void {
-    const size = this.#sources.reduce((sum, source) => sum + source.size, 0);
+    const size = this.#size();
     const name = this.#sources[0]?.name ?? '';
     if (bytes <= Math.max(SMALL, ratio * size)) return;
     throw tooLarge(name, `the images have ${Math.round(bytes)} bytes, more than ${size} bytes of files can hold`);
+  }
+
+  /** Throws `too-large` if the voxels of small files take much memory, as those of masks without any object would. */
+  #checkMemory(channel: Channel, formats: Map<Plane['page'], Format>): void {
+    const [first] = formats.values();
+    if (!first) return;
+    const each = first.width * first.height * new (arrayOf(first.type))(0).BYTES_PER_ELEMENT;
+    const isMixed = channel.planeAt(0, 0).part === 'luminance';
+    const bytes = each * (this.#layout.slices * this.frames + (isMixed ? WEIGHTS.length : 0));
+    const size = this.#size();
+    if (bytes <= Math.max(FREE_BYTES, BYTES_PER_BYTE * size)) return;
+    throw tooLarge(
+      this.#sources[0]?.name ?? '',
+      `${bytes} bytes of voxels are more than ${size} bytes of files can hold`,
+    );
+  }
+
+  #size(): number {
+    return this.#sources.reduce((sum, source) => sum + source.size, 0);
   }
 
   async #voxels(channel: Channel, formats: Map<Plane['page'], Format>, watch: Watch): Promise<VoxelArray> {
@@ -161,7 +193,13 @@ export class TiffStack {
     const [each, count] = [first.width * first.height, this.#layout.slices * this.frames];
     const data = this.#allocate(arrayOf(first.type), each * count);
     let done = 0;
+    let left = MOST_TIMES * this.#size() + SMALL;
     const listener: Listener = {
+      stored: (bytes, { label }) => {
+        left -= bytes;
+        if (left < 0)
+          throw tooLarge(label, 'its strips or tiles share their bytes, and are more than the file can hold');
+      },
       pause: watch.pause,
       progress: (share) => watch.onProgress?.((done + share) / count),
       missing: ({ label }) => watch.lost.add(label),
@@ -201,7 +239,10 @@ function shared(kinds: Map<string, Format>, format: Format): Format {
   return before;
 }
 
-const warning = (text: string): Warning => ({ code: 'reader', text: `TIFF: ${text}` });
+/** Most characters of a warning or remark. */
+const LONGEST_TEXT = 1000;
+
+const warning = (text: string): Warning => ({ code: 'reader', text: shortened(`TIFF: ${text}`, LONGEST_TEXT) });
 
 /** Returns 64-bit integers, as doubles, in 32 bits if all of them fit. */
 function narrowed(data: VoxelArray, kind: 'signed' | 'unsigned'): VoxelArray {

@@ -5,7 +5,7 @@ type Registry = Zarrita['registry'];
 type Factory = NonNullable<ReturnType<Registry['get']>>;
 type CodecClass = Awaited<ReturnType<Factory>>;
 
-/** What a codec of zarrita is told of its chunk. */
+/** The part of zarrita's description of a chunk that codecs here use. */
 interface ChunkMeta {
   dataType: string;
   shape: readonly number[];
@@ -105,8 +105,11 @@ async function inflated(bytes: Uint8Array, format: CompressionFormat, most: numb
 /** Most bytes of a block of Zstandard (RFC 8878, section 3.1.1.2). */
 const ZSTD_BLOCK = 2 ** 17;
 
-/** Bytes that frames without a size may have in the worst case; their blocks are mostly shorter than the longest. */
-const ZSTD_UNKNOWN = 2 ** 28;
+/**
+ * Bytes that frames without a size may have in the worst case, at least and as a multiple of those of the chunk; their blocks
+ * are mostly shorter than the longest.
+ */
+const ZSTD_UNKNOWN = [2 ** 25, 8] as const;
 
 /**
  * Returns the size that the first frame of Zstandard states; or else, if its blocks could give more than is bearable, the
@@ -126,7 +129,7 @@ function zstdSize(bytes: Uint8Array, most: number): number | undefined {
   if (sizeBytes === 4) return view.getUint32(at, true);
   if (sizeBytes === 8) return Number(view.getBigUint64(at, true));
   const size = worstBlocks(view, at);
-  return size > Math.max(most, ZSTD_UNKNOWN) ? size : undefined;
+  return size > Math.max(ZSTD_UNKNOWN[0], ZSTD_UNKNOWN[1] * most) ? size : undefined;
 }
 
 /** Returns the most bytes that the blocks from `at` on can give (RFC 8878, section 3.1.1.2). */

@@ -107,7 +107,7 @@ export class Level {
     return dims.reduce((count, size, axis) => count * Math.ceil(size / (chunks[axis] as number)), 1);
   }
 
-  /** Size of a voxel, bytes. */
+  /** Number of bytes of the value of a voxel. */
   get voxelBytes(): number {
     return new this.VoxelArrays(0).BYTES_PER_ELEMENT;
   }

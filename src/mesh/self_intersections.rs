@@ -1,7 +1,7 @@
 //! Self-intersections of triangle meshes: pairs found by a bounding volume hierarchy, decided by exact predicates.
 
 use super::TriangleMesh;
-use crate::math::order::{combined_rank, sort_ranks};
+use crate::math::order::{combined_rank, sort_by_rank, sort_ranks};
 use crate::math::predicates::{
     collinear, triangles_intersect, triangles_intersect_sharing_vertex, triangles_overlap_sharing_edge,
 };
@@ -40,11 +40,11 @@ pub fn count_self_intersections(mesh: &TriangleMesh) -> usize {
 }
 
 /// Number of self-intersections after which [`count_in_time`] stops.
-const MOST_FOUND: usize = 1_000_000;
+const MOST_FOUND: usize = 100_000;
 
 /// Number of pairs of triangles, and of pairs for each triangle, after which [`count_in_time`] stops: meshes have some
-/// twenty pairs a triangle whose boxes overlap.
-const MOST_TESTED: [usize; 2] = [3_000_000, 60];
+/// twenty pairs a triangle whose boxes overlap, and flat polygons of many corners more.
+const MOST_TESTED: [usize; 2] = [20_000_000, 60];
 
 /// The number of self-intersections of a mesh, as far as they were counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,18 +55,50 @@ pub(super) struct CountInTime {
 }
 
 /// Counts self-intersections as [`count_self_intersections`] does, but stops where so many triangles lie on each other that
-/// time would be quadratic.
+/// time would be quadratic. Triangles with the same corners are tested once.
 pub(super) fn count_in_time(mesh: &TriangleMesh) -> CountInTime {
-    let most = MOST_TESTED[0].max(MOST_TESTED[1].saturating_mul(mesh.triangles.len()));
-    let mut count = CountInTime { found: 0, is_complete: true };
-    let mut tested = 0;
-    for_each_tested_pair(mesh, |_, _, intersect| {
-        tested += 1;
-        count.found += usize::from(intersect);
-        count.is_complete = tested < most && count.found < MOST_FOUND;
-        count.is_complete
-    });
-    count
+    let (distinct, times) = distinct_triangles(mesh);
+    let most = MOST_TESTED[0].max(MOST_TESTED[1].saturating_mul(times.len()));
+    let corners = |t: usize| distinct.triangles[t].map(|v| distinct.positions[v as usize]);
+    let pairs = times.iter().enumerate().filter(|&(t, &times)| times > 1 && !collinear(corners(t)));
+    let mut found = pairs.fold(0, |sum: usize, (_, &times)| sum.saturating_add(times * (times - 1) / 2));
+    let (mut tested, mut is_complete) = (0, found < MOST_FOUND);
+    if is_complete {
+        for_each_tested_pair(&distinct, |s, t, intersect| {
+            tested += 1;
+            if intersect {
+                found = found.saturating_add(times[s as usize].saturating_mul(times[t as usize]));
+            }
+            is_complete = tested < most && found < MOST_FOUND;
+            is_complete
+        });
+    }
+    CountInTime { found: found.min(MOST_FOUND), is_complete }
+}
+
+/// Returns the valid triangles of a mesh, those with the same corners once, and how often each is there.
+fn distinct_triangles(mesh: &TriangleMesh) -> (TriangleMesh, Vec<usize>) {
+    let valid = mesh.triangles.iter().filter(|triangle| valid_corners(mesh, triangle).is_some());
+    let mut triangles: Vec<[u32; 3]> = valid.copied().collect();
+    let sorted = |&[a, b, c]: &[u32; 3]| {
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        [low, a ^ b ^ c ^ low ^ high, high]
+    };
+    sort_by_rank(&mut triangles, |triangle| u64::from(sorted(triangle)[2]));
+    sort_by_rank(&mut triangles, |triangle| combined_rank(sorted(triangle)[0], sorted(triangle)[1]));
+    let mut times = Vec::new();
+    let mut distinct = Vec::new();
+    for same in triangles.chunk_by(|one, other| sorted(one) == sorted(other)) {
+        distinct.push(same[0]);
+        times.push(same.len());
+    }
+    let mesh = TriangleMesh {
+        positions: mesh.positions.clone(),
+        triangles: distinct,
+        origin: mesh.origin,
+        ..TriangleMesh::default()
+    };
+    (mesh, times)
 }
 
 /// Calls `visit` with each pair of triangles whose boxes overlap, and whether they intersect, until it returns false.

@@ -83,7 +83,7 @@ pub(crate) fn bounded_marching_cubes<'a>(
         marching.layer(z, next)?;
         let triangles = marching.mesh.triangles.len();
         if triangles > most {
-            // What is done with a surface takes ten times its memory.
+            // Work with a surface takes ten times its memory.
             return Err(VolumeError::TooLarge { bytes: 180 * triangles as u64 });
         }
     }

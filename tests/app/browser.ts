@@ -3,7 +3,7 @@ import { join } from 'node:path';
 import type { Browser, BrowserContextOptions, Page } from 'playwright-core';
 import { expect } from 'vitest';
 import { launchChromium } from '../../scripts/chromium.mjs';
-import { serve } from '../../scripts/serve.mjs';
+import { serveApp } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
 
 /** Timeout in milliseconds for anything on the page. */
@@ -58,9 +58,10 @@ export async function openApp(
   address = '',
   deviceScaleFactor = 0.5,
 ): Promise<App> {
-  const server = await serve(at('dist'), 0);
+  const server = await serveApp(at('dist'), 0);
   const browser = await launch();
   const context = await browser.newContext({ viewport, deviceScaleFactor });
+  await context.addInitScript(agree);
   // A busy machine with software rendering is slow, not wrong.
   context.setDefaultTimeout(PATIENCE);
   const complaints: string[] = [];
@@ -69,6 +70,15 @@ export async function openApp(
   const page = await context.newPage();
   await page.goto(server.address + address);
   return { page, address: server.address, complaints, close: () => closeAll(browser, server) };
+}
+
+/** Agrees at once to lose what is not saved, unless a test sets `data-asked` at the page's root. */
+function agree(): void {
+  const answer = () => {
+    if (document.documentElement.dataset.asked === undefined)
+      document.querySelector<HTMLElement>('dialog.question[open] button[value=go]')?.click();
+  };
+  new MutationObserver(answer).observe(document, { childList: true, subtree: true, attributes: true });
 }
 
 async function closeAll(browser: Browser, server: { close: () => unknown }): Promise<void> {

@@ -2,7 +2,7 @@ import { cp, mkdtemp, readFile, rm } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { expect } from 'vitest';
-import { serve } from '../../scripts/serve.mjs';
+import { serveApp } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
 import { launch } from './browser';
 
@@ -10,7 +10,7 @@ import { launch } from './browser';
 export async function deploy() {
   const folder = await mkdtemp(join(tmpdir(), 'vesicle-'));
   await cp(at('dist'), folder, { recursive: true });
-  let server = await serve(folder, 0);
+  let server = await serveApp(folder, 0);
   const { address } = server;
   const browser = await launch();
   const page = await browser.newPage();
@@ -35,7 +35,7 @@ export async function deploy() {
     stopServer: () => server.close(),
     /** Serves at the same address again. */
     restartServer: async () => {
-      server = await serve(folder, Number(new URL(address).port));
+      server = await serveApp(folder, Number(new URL(address).port));
     },
     close: async () => {
       await browser.close();

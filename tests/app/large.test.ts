@@ -2,8 +2,8 @@
 import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, expect, test } from 'vitest';
 import { at } from '../../scripts/shell.mjs';
-import { mayReach, SERVERS } from '../../www/src/ui/large-source';
-import { filesOf } from '../js/zarr-stores';
+import { addressProblem } from '../../www/src/ui/large-source';
+import { filesOf, serveImage } from '../js/zarr-stores';
 import { type App, drop, measures, open, openApp, QUICK, reach, recordStates, unfold } from './browser';
 import { LONG } from './long';
 
@@ -122,18 +122,46 @@ test('what needs the whole volume is refused with a reason', LONG, async () => {
   expect(await app.page.locator('[data-transport=undo]').isDisabled()).toBe(true);
 });
 
-test('the page names the servers that it may reach, and its policy has the same', async () => {
-  const html = await readFile(at('www/index.html'), 'utf8');
-  expect(/connect-src 'self' ([^;]*);/.exec(html)?.[1]?.split(' ')).toEqual(SERVERS);
-  expect(await app.page.textContent('.large .help')).toContain('livingobjects.ebi.ac.uk');
-  const own = 'https://here.org';
-  const reachable = ['https://here.org/a.zarr', `${SERVERS[0]}/a`, 'https://bucket.s3.amazonaws.com/a.zarr'];
-  const others = ['https://there.org/a', 'http://bucket.s3.amazonaws.com/a', 'https://evils3.amazonaws.com/a'];
-  expect(reachable.map((url) => mayReach(new URL(url), own))).toEqual([true, true, true]);
-  expect(others.map((url) => mayReach(new URL(url), own))).toEqual([false, false, false]);
-  await app.page.getByLabel('Address').fill('https://example.org/image.zarr');
+test('an image of another server is read by the worker of this lab; the page itself cannot', async () => {
+  await openLab();
+  const images = await serveImage(IMAGE);
+  const address = app.page.getByLabel('Address');
+  await expectExtracted(async () => {
+    await address.fill(images.url);
+    await address.press('Enter');
+  });
+  expect(images.log.length).toBeGreaterThan(3);
+  expect(app.complaints.splice(0).filter((one) => !one.startsWith(`foreign: ${images.url}/`))).toEqual([]);
+  const url = `${images.url}/zarr.json`;
+  const read = (url: string) => fetch(url).then(({ status }) => status, String);
+  expect(await app.page.evaluate(read, url)).toBe('TypeError: Failed to fetch');
+  expect(app.complaints.splice(0).join()).toMatch(/violates .*Content Security Policy.*connect-src 'self'/);
+  await images.close();
+});
+
+test('other addresses are refused in words: those that are not encrypted, have a password, or name no server', async () => {
+  const here = { href: 'http://here.org/app/', origin: 'http://here.org' };
+  const accepted = ['https://a.org/image.zarr', 'http://here.org/image.zarr', 'image.zarr'];
+  const loopback = ['http://localhost:8080/a.zarr', 'http://127.0.0.1/a.zarr', 'https://[::1]/a.zarr'];
+  for (const address of [...accepted, ...loopback]) expect(addressProblem(address, here)).toBeUndefined();
+  for (const [address, problem] of [
+    ['http://a.org/image.zarr', /^a\.org is not read without encryption/],
+    ['http://localhost.a.org/', /^localhost\.a\.org is not read without/],
+    ['http://[::1]:8080/', /^\[::1\]:8080 is not read without/],
+    ['https://me:secret@a.org/', /user name or a password/],
+    ['https://', /not an address/],
+    ['file:///etc/passwd', /begin with file:/],
+    ['data:,1', /begin with data:/],
+    ['blob:http://here.org/1', /begin with blob:/],
+  ] as const)
+    expect(addressProblem(address, here)).toMatch(problem);
+  // Elsewhere the page's own server is another one.
+  expect(addressProblem('http://here.org/', { href: 'data:,', origin: 'null' })).toMatch(/not read without/);
+  expect(addressProblem('data:,1', { href: 'data:,', origin: 'null' })).toMatch(/begin with data:/);
+  await app.page.getByLabel('Address').fill('http://example.org/image.zarr');
   await app.page.getByLabel('Address').press('Enter');
-  expect(await app.page.textContent('.large [role=alert]')).toMatch(/^example\.org is not among/);
+  expect(await app.page.textContent('.large [role=alert]')).toMatch(/^example\.org is not read without encryption/);
+  expect(await app.page.getByLabel('Address').getAttribute('aria-invalid')).toBe('true');
 });
 
 for (const [before, state, options] of [

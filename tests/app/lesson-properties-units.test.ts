@@ -4,17 +4,14 @@ import { expect, test } from 'vitest';
 import { isTypeset } from '../../www/src/lessons/bounds';
 import { holds, unmetPart } from '../../www/src/lessons/check';
 import { filesOf, type LessonFiles, parseLesson } from '../../www/src/lessons/lesson';
+import type { LabReading } from '../../www/src/lessons/reading';
 
 const numRuns = Number(process.env.PROPERTY_RUNS ?? 500);
 
-const READING = {
-  lab: 'extract',
-  state: 'done',
-  example: 'a',
-  params: {},
-  measures: { chi: 2 },
-  warnings: [],
-} as const;
+const READING: LabReading = {
+  ...{ lab: 'extract', state: 'done', example: 'a' },
+  ...{ params: {}, measures: { chi: 2 }, warnings: [] },
+};
 
 const name = fc.constantFrom(
   ...['all', 'any', 'not', 'lab', 'state', 'example', 'measure', 'param', 'equals', 'above', 'within', 'step', 'times'],
@@ -70,7 +67,7 @@ function read(files: LessonFiles) {
     expect(first).toBe('lesson.json');
     return parseLesson(files, 'en');
   } catch (error) {
-    // What a programming error throws is none in words.
+    // A programming error throws others, such as a TypeError.
     expect((error as Error).constructor).toBe(Error);
     expect((error as Error).message.length).toBeLessThan(2500);
     return undefined;

@@ -1,6 +1,5 @@
 /** Lessons in the browser: done by the interface, opened from files and addresses, saved, printed, and in German. */
 import { readFile } from 'node:fs/promises';
-import type { Dialog } from 'playwright-core';
 import { zipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { type App, drop, openApp, overflow, reach } from './browser';
@@ -223,16 +222,18 @@ describe('in German', LONG, () => {
     expect(await panel().locator('h2').textContent()).toBe('Topologie und χ');
     expect(await app.page.locator('dt', { hasText: 'Euler-Charakteristik' }).count()).toBe(1);
     // The page asks first, since results are lost.
-    app.page.once('dialog', (dialog) => dialog.dismiss());
+    await app.page.evaluate(() => {
+      document.documentElement.dataset.asked = '';
+    });
+    const question = app.page.locator('dialog.question');
     await app.page.selectOption('#language', 'en');
+    await question.getByRole('button', { name: 'Bleiben' }).click();
     expect(await app.page.inputValue('#language')).toBe('de');
-    const accept = (dialog: Dialog) => dialog.accept();
-    app.page.on('dialog', accept);
     await app.page.selectOption('#language', 'en');
+    await question.getByRole('button', { name: 'Verlassen' }).click();
     await expect.poll(() => app.page.getAttribute('html', 'lang')).toBe('en');
     await app.page.selectOption('#language', 'de');
     await panel().getByText('Topologie und χ').waitFor();
-    app.page.off('dialog', accept);
     await goTo('#extract?example=linked-rings&v=2');
     await app.page.getByRole('button', { name: 'Lektionen' }).waitFor();
   });

@@ -15,7 +15,7 @@ import { crossSection } from '../../www/src/track/cross-section';
 import { History } from '../../www/src/ui/history';
 import { anySession } from './made-sessions';
 
-const RUNS = Number(process.env.PROPERTY_RUNS ?? 200);
+const RUNS = Number(process.env.PROPERTY_RUNS ?? 100);
 const LIMITS = { timeout: 60_000 + 20 * RUNS };
 /** Longest time that a session may take to be read, milliseconds of this process. */
 const MOST_MS = 1000;
@@ -62,7 +62,7 @@ function replaced(value: Json, [name, ...path]: string[], by: Json | undefined):
   return copy;
 }
 
-/** Reads the files of a session, and tests what comes of it: a session that the labs can use, or an error in words. */
+/** Reads the files of a session, and tests the result: a session that the labs can use, or an error in words. */
 async function readAny(files: Files): Promise<Session | undefined> {
   const before = process.cpuUsage();
   try {
@@ -114,6 +114,11 @@ const USES: { [Lab in Session['lab']]: (content: ContentOf<Lab>) => void } = {
   track: (content) => {
     const { now } = unpackTrack(content);
     new History().rewind(now.page.record.mark(now.saved.iteration));
+    for (const { surface } of content.frames) {
+      const { vertices, triangles, positions, indices } = surface;
+      assert(positions.length >= 3 * vertices && indices.length >= 3 * triangles);
+      assert(indices.subarray(0, 3 * triangles).every((vertex) => vertex < vertices));
+    }
     for (const { surface } of now.page.record.frames)
       assert(crossSection(surface, { origin: [0, 0, 0], normal: [1, 0, 0] }).length % 6 === 0);
     if (content.view) assert(isPoint(content.view.crosshair));
@@ -148,11 +153,11 @@ function expectPlain(value: unknown): void {
 }
 
 /** Files of sessions to change, made once: making one takes longer than reading it. */
-const MADE = fc.sample(anySession, { numRuns: 100, seed: 7 });
-const files = MADE.map(async (session) => unzipSync(await writeSession(session)));
+const MADE = fc.sample(anySession, { numRuns: 40, seed: 7 });
+const ALL = MADE.map(async (session) => unzipSync(await writeSession(session)));
 
 test('any value at any path of a session is read as what the labs can use, or refused in words', LIMITS, async () => {
-  const indices = (await Promise.all(files)).map((one) => ({ files: one, index: indexIn(one) }));
+  const indices = (await Promise.all(ALL)).map((one) => ({ files: one, index: indexIn(one) }));
   const known = indices.map((one) => ({ ...one, paths: pathsIn(one.index) }));
   let readable = 0;
   const change = fc.tuple(fc.nat(), fc.option(JSON_VALUE, { nil: undefined }));
@@ -168,6 +173,19 @@ test('any value at any path of a session is read as what the labs can use, or re
   expect(readable).toBeGreaterThan(RUNS / 100);
 });
 
+test('a surface that lacks vertices of its triangles is refused', async () => {
+  const index = MADE.findIndex(({ lab }) => lab === 'track');
+  const files = await ALL[index];
+  const [frame] = indexIn(files ?? {}).frames as { surface: Json }[];
+  for (const counts of [{ vertices: 2 }, { vertices: 4 }, { triangles: 2 }]) {
+    const frames = [{ ...frame, surface: { ...(frame?.surface as object), ...counts } }];
+    const changed = withIndex(files ?? {}, { ...indexIn(files ?? {}), frames });
+    await expect(readSession(Uint8Array.of(), () => ({ ...changed }))).rejects.toThrow(
+      'frames[0].surface is of the wrong',
+    );
+  }
+});
+
 test('what is written is read', LIMITS, async () => {
   const property = fc.asyncProperty(anySession, async (session) => {
     const { lab, hash, source, content } = await readSession(await writeSession(session));
@@ -178,7 +196,7 @@ test('what is written is read', LIMITS, async () => {
 });
 
 test('bytes of any kind in place of a session, or of a part of it, are refused in words', LIMITS, async () => {
-  const all = await Promise.all(files);
+  const all = await Promise.all(ALL);
   const zips = all.map((one) => zipSync(one));
   const index = fc.oneof(
     fc.uint8Array(),

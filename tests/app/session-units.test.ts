@@ -1,20 +1,33 @@
 /** Session files: what is written is read again, and what cannot be read is refused by name. */
+import { readFile } from 'node:fs/promises';
 import { strFromU8, strToU8, unzipSync, type Zippable, zipSync } from 'three/addons/libs/fflate.module.js';
 import { describe, expect, test } from 'vitest';
+import { at } from '../../scripts/shell.mjs';
 import { describe as describeFiles, matching, readSession, writeSession } from '../../www/src/session/file';
 import { isSession } from '../../www/src/session/recognise';
 
 const BYTES = Uint8Array.from({ length: 1000 }, (_, i) => i * i);
+const MOMENT = {
+  state: BYTES.slice(1),
+  model: { levels: 1, iteration: 12, done: false },
+  page: {
+    choice: { kind: 'contour', bubbles: 5, levels: 1, edge: 0.1 + 0.2 },
+    ...{ params: { iso: -0, topology: 'adaptive' }, attractors: [], history: { list: 0, iteration: 12 } },
+  },
+};
+const REPORT = {
+  ...{ iteration: 12, done: false, phase: 'level 1', progress: Number.NaN, residual: Number.POSITIVE_INFINITY },
+  ...{ tolerance: 1e-6, vertices: 4, triangles: 4, components: 1, euler: 2, times: { forces: 0.5 }, warnings: [] },
+  events: { creations: 0, deletions: 0, inversions: 0, axial: 0, annular: 0, vanished: 0, seeds: 0 },
+};
 const session = async (included = true) => ({
   lab: 'extract' as const,
   hash: '#extract?p.iso=95&v=2',
   source: { name: 'a.nrrd', files: await describeFiles([{ name: 'a.nrrd', bytes: BYTES }], included) },
-  content: {
-    state: BYTES.slice(1),
-    model: { iteration: 12, numbers: [0.1 + 0.2, Number.NaN, -0, Number.POSITIVE_INFINITY] },
-    undo: [{ label: 'step', state: Uint8Array.of(), positions: new Float32Array([1.5, Number.NaN]) }],
-  },
+  content: { ...MOMENT, undo: [{ label: 'step', ...MOMENT, state: Uint8Array.of() }], redo: [], reports: [[REPORT]] },
 });
+/** Fields that a session has, too, when it is read. */
+const NOTHING = { edits: [], undone: [], warnings: [] };
 
 /** Returns a session's file with its parts changed. */
 async function changed(change: (files: Record<string, Uint8Array>) => void): Promise<Uint8Array> {
@@ -33,10 +46,56 @@ function withIndex(change: (index: Record<string, unknown>) => void): Promise<Ui
 }
 
 test('a session that was written is read again, bit for bit', async () => {
+  for (const written of [await session(), await session(false)]) {
+    const content = { ...written.content, ...NOTHING };
+    expect(await readSession(await writeSession(written))).toEqual({ ...written, content });
+  }
+});
+
+test('a file of version 1 without what came later is read', async () => {
+  const { lab, content } = await readSession(
+    new Uint8Array(await readFile(at('tests/app/data/version-1.vesicle.zip'))),
+  );
+  expect(lab).toBe('extract');
+  expect(content).toMatchObject({ edits: [], undone: [], warnings: [], model: { iteration: 174 } });
+});
+
+test('a session keeps warnings, and calls without arguments in its log', async () => {
+  const setup = { start: { kind: 'contour' }, levels: 1, params: {}, attractors: [] };
+  const log = {
+    setup,
+    calls: [
+      { call: 'step', given: 2 },
+      { call: 'seed', given: undefined },
+    ],
+  };
+  const warnings = [
+    ...[
+      { code: 'anisotropic', text: 'Voxels are long.' },
+      { code: 'reader', text: 'One.', where: { frame: 2 } },
+    ],
+    { code: 'thin-label', text: 'It is thin.', where: { point: [1, 2.5, -3] } },
+  ];
   const written = await session();
-  expect(await readSession(await writeSession(written))).toStrictEqual(written);
-  const without = await session(false);
-  expect(await readSession(await writeSession(without))).toStrictEqual(without);
+  const content = { ...written.content, model: { ...MOMENT.model, log }, warnings };
+  expect((await readSession(await writeSession({ ...written, content }))).content).toMatchObject(content);
+});
+
+test('a huge session.json is not read', async () => {
+  for (const index of [new Uint8Array(2 ** 27 + 1), strToU8(`{"x":[0${',[]'.repeat(5e6)}]}`)])
+    await expect(readSession(Uint8Array.of(), () => ({ 'session.json': index }))).rejects.toThrow(
+      'more than 128 MiB or 5',
+    );
+});
+
+test('long names are cut', async () => {
+  const bytes = await withIndex((index) => Object.assign(index.source as object, { name: 'n'.repeat(20_000) }));
+  expect((await readSession(bytes)).source.name).toBe('n'.repeat(200));
+});
+
+test('fields that no session has are left out', async () => {
+  const { content } = await readSession(await withField('{"y":[1]}'));
+  expect(content).not.toHaveProperty('x');
 });
 
 test('a session is recognised by its name or by its first entry, and other archives are not', async () => {
@@ -58,7 +117,7 @@ test('the files of a session are found by their content', async () => {
 });
 
 describe('a file is refused that', () => {
-  const refused: [string, () => Promise<Uint8Array>, string][] = [
+  const refused: [string, () => Promise<Uint8Array>, string | RegExp][] = [
     ['is no ZIP', async () => strToU8('PK? no'), 'no ZIP'],
     ['is empty', async () => Uint8Array.of(), 'no ZIP'],
     ['ends early', async () => (await writeSession(await session())).slice(0, -40), 'no ZIP'],
@@ -78,7 +137,36 @@ describe('a file is refused that', () => {
       () => withIndex((index) => (index.source = { name: '', files: [{}] })),
       'damaged',
     ],
-    ['has a broken list of parts', () => withIndex((index) => (index.parts = 7)), 'is missing'],
+    ['has a broken list of parts', () => withIndex((index) => (index.parts = 7)), 'damaged'],
+    ['has a reserved name in the list of parts', () => withPart('constructor'), 'constructor is missing'],
+    ['has a word as a coordinate', () => withView({ crosshair: ['x', 1, 2] }), 'view.crosshair[0] is not a number'],
+    ['has no finite coordinate', () => withView({ crosshair: [0, NAN, 0] }), 'view.crosshair[1] is not a number'],
+    ['has a coordinate too far', () => withView({ crosshair: [0, 0, 1e308] }), 'view.crosshair[2] is not a number'],
+    ['has a point of two numbers', () => withView({ crosshair: [0, 0] }), 'view.crosshair'],
+    ['has an unknown option', () => withView({ options: { ...OPTIONS, slices: 'x' } }), 'view.options.slices is none'],
+    ['lacks an option', () => withView({ options: { surface: true } }), 'view.options.edges is missing'],
+    ['has an infinite parameter', () => withPage({ params: { iso: INFINITY } }), 'page.params'],
+    ['has too many attractors', () => withPage({ attractors: Array(20_000).fill(0) }), 'page.attractors is too long'],
+    [
+      'refers to reports it lacks',
+      () => withPage({ history: { list: 1, iteration: 0 } }),
+      'page.history.list does not',
+    ],
+    [
+      'has an unknown call',
+      () => withLog([{ call: 'x();', given: 1 }]),
+      'model.log.calls[0].call is none of the known',
+    ],
+    ['has an unknown edit', () => withIndex((index) => (index.edits = [{ op: 'free' }])), 'edits[0].op is none of'],
+    [
+      'has a warning that is none',
+      () => withIndex((index) => (index.warnings = [{ code: '=x()' }])),
+      'warnings[0].code',
+    ],
+    ['has a path too long to tell', () => withPage({ params: { ['p'.repeat(5000)]: 1 } }), /^.{20,300}$/],
+    ['has a name that objects have', () => withField('{"__proto__":{}}'), 'json is damaged.'],
+    ['has too many levels', () => withField(nested(40)), 'json is damaged.'],
+    ['has levels without end', () => withField(nested(1e5)), 'json is damaged.'],
     ['declares more bytes than fit', () => declaring(0xffff_fff0), 'more than 1000 parts or 1 GiB'],
     ['has too many parts', () => changed((files) => addMany(files)), 'more than 1000 parts or 1 GiB'],
   ];
@@ -86,6 +174,34 @@ describe('a file is refused that', () => {
     await expect(readSession(await make())).rejects.toThrow(message);
   });
 });
+
+/** Numbers that JSON does not have. */
+const [NAN, INFINITY] = [{ $number: 'NaN' }, { $number: 'Infinity' }];
+const OPTIONS = { surface: true, edges: false, color: 'plain', slices: 'walls' };
+const POINT = [0, 0, 0];
+const VIEW = { camera: { position: POINT, target: POINT }, crosshair: POINT, options: OPTIONS };
+
+const withView = (view: object) =>
+  withIndex((index) => {
+    index.view = { ...VIEW, ...view };
+  });
+const withPage = (page: object) => withIndex((index) => Object.assign(index.page as object, page));
+const withPart = (name: string) => withIndex((index) => Object.assign(index.parts as object, { [name]: '' }));
+const withLog = (calls: unknown[]) =>
+  withIndex((index) => {
+    const setup = { start: { kind: 'contour' }, levels: 1, params: {}, attractors: [] };
+    index.model = { ...MOMENT.model, log: { setup, calls } };
+  });
+
+/** Returns a session's file with another field in `session.json`, which no session has. */
+function withField(json: string): Promise<Uint8Array> {
+  return changed((files) => {
+    const index = strFromU8(files['session.json'] ?? Uint8Array.of());
+    files['session.json'] = strToU8(index.replace('"page":', `"x":${json},"page":`));
+  });
+}
+
+const nested = (levels: number) => '['.repeat(levels) + ']'.repeat(levels);
 
 /** Returns a session's file in whose directory an entry has another size after unpacking. */
 async function declaring(size: number): Promise<Uint8Array> {

@@ -6,6 +6,7 @@ import { afterAll, beforeAll, expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { readSession } from '../../www/src/session/file';
+import { contentOf } from '../../www/src/session/recognise';
 import { type App, afterRun, drop, open, openApp, QUICK, reach, unfold } from './browser';
 import { LONG } from './long';
 
@@ -161,9 +162,9 @@ test('a session with its data opens anywhere, and one that cannot be read change
 test('a file of version 1 opens', async () => {
   const { page } = app;
   const bytes = new Uint8Array(await readFile(at('tests/app/data/version-1.vesicle.zip')));
-  const { content } = await readSession(bytes);
+  const content = contentOf(await readSession(bytes), 'extract');
   await reopened(page, asFile(bytes), 'extract');
-  const now = (await readSession(await session(page))).content;
+  const now = contentOf(await readSession(await session(page)), 'extract');
   expect(now.state).toEqual(content.state);
   expect(now.undo).toEqual(content.undo);
 });

@@ -113,7 +113,12 @@ async function found(): Promise<void> {
 }
 
 test('`npx vite`: in NiiVue, and clicking', async () => {
-  const server = await createServer({ root: folder, configFile: false, logLevel: 'error', server: { port: 0 } });
+  const server = await createServer({
+    root: folder,
+    configFile: false,
+    logLevel: 'error',
+    server: { host: '127.0.0.1', port: 0 },
+  });
   try {
     await server.listen();
     const address = server.resolvedUrls?.local[0] ?? '';
@@ -144,7 +149,7 @@ test('`npx vite build`', async () => {
 });
 
 test('`npx vite preview --outDir plain`', async () => {
-  const options = { build: { outDir: 'plain' }, preview: { port: 0 } };
+  const options = { build: { outDir: 'plain' }, preview: { host: '127.0.0.1', port: 0 } };
   const server = await preview({ root: folder, configFile: false, logLevel: 'error', ...options });
   try {
     await page.goto(server.resolvedUrls?.local[0] ?? '');

@@ -3,9 +3,8 @@ import init, { Volume } from 'vesicle';
 import { beforeAll, describe, expect, test } from 'vitest';
 import { toCsv } from '../../www/src/labs/csv';
 import { framesCsv } from '../../www/src/labs/track-measures';
-import { readSession, writeSession } from '../../www/src/session/file';
 import { History } from '../../www/src/ui/history';
-import { cellOf, concerning, merged, placeText, type Warning, warningsIn } from '../../www/src/warnings';
+import { cellOf, concerning, merged, placeText, type Warning } from '../../www/src/warnings';
 import { viewOf } from '../../www/src/worker/volumes';
 
 const LONG_VOXELS: Warning = { code: 'anisotropic', text: 'Voxels are long, very long.' };
@@ -38,12 +37,6 @@ test('frames are counted from 1 where people read them', () => {
     'Label 5',
     'At 1, 2.5, -3',
   ]);
-});
-
-test('what is no warning in a file is left out', () => {
-  const broken = [{ code: 'x' }, { ...ENDS, where: {} }, { ...ENDS, where: { point: [1] } }, null, 'a'];
-  expect(warningsIn([...ALL, ...broken])).toEqual(ALL);
-  expect(warningsIn({ length: 3 })).toEqual([]);
 });
 
 test('the view of a volume has its warnings', () => {
@@ -85,10 +78,4 @@ describe('CSV', () => {
   test('cells have no commas', () => {
     expect(cellOf(ALL)).not.toContain(',');
   });
-});
-
-test('a session keeps warnings', async () => {
-  const content = { warnings: ALL };
-  const written = await writeSession({ lab: 'track', hash: '#track', source: { name: 'a', files: [] }, content });
-  expect(warningsIn((await readSession(written)).content.warnings)).toEqual(ALL);
 });

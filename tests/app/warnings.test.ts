@@ -54,7 +54,7 @@ test('warnings are shown beside the measures, lead to their place, and are in al
   expect(await list.isVisible()).toBe(false);
   const plain = await saved(page, '[data-export=ply]');
   const session = await readSession(await saved(page, '[data-action=session]'));
-  expect(session.content.warnings).toBeUndefined();
+  expect(session.content.warnings).toEqual([]);
   const bytes = await writeSession({ ...session, content: { ...session.content, warnings: WARNINGS } });
   await drop(page, [{ name: 'a.vesicle.zip', bytes }]);
 

@@ -67,7 +67,7 @@ test('labels that were painted: another lab, going back, other data, and loading
   await drop(page, [{ name: 'other.nrrd', bytes: new TextEncoder().encode('NRRD0004\n') }]);
   await answer(false, 'Open other data');
   await page.evaluate(() => {
-    location.hash = '#segment?example=mouse';
+    location.hash = '#segment?example=tooth';
   });
   await answer(false);
   expect(page.url()).toBe(address);

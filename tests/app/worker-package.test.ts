@@ -110,9 +110,9 @@ async function publish(headers: Record<string, string>, files: Record<string, st
   const server = createServer((request, response) => {
     answer(request.url ?? '', response).catch(() => response.writeHead(404).end());
   });
-  await new Promise<void>((done) => server.listen(0, done));
+  await new Promise<void>((done) => server.listen(0, '127.0.0.1', done));
   const { port } = server.address() as AddressInfo;
-  return { address: `http://localhost:${port}/`, close: () => server.close() };
+  return { address: `http://127.0.0.1:${port}/`, close: () => server.close() };
 }
 
 test('a strict content security policy is sufficient', async () => {

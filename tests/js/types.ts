@@ -16,7 +16,7 @@ same<Same<Omit<built.VolumeInit, 'unit' | 'warnings'>, contract.VolumeInit>>(tru
 same<Same<built.VolumeFormat, contract.VolumeFormat>>(true);
 same<Same<built.MeshArrays, contract.MeshArrays>>(true);
 same<Same<built.MeshInfo, contract.MeshInfo>>(true);
-same<Same<built.MeshReport, contract.MeshReport>>(true);
+same<Same<Omit<built.MeshReport, 'hasMore'>, contract.MeshReport>>(true);
 same<Same<built.MeshFormat, contract.MeshFormat>>(true);
 // The codes of warnings are more with each version.
 same<Same<Omit<built.StepReport, 'warnings'>, contract.StepReport>>(true);

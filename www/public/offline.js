@@ -24,11 +24,11 @@ async function kept(request) {
   }
 }
 
-async function keep(request, response) {
+async function keep(url, response) {
   if (!response.ok || response.status === 206) return;
   try {
     const cache = await caches.open(CACHE);
-    await cache.put(request, response);
+    await cache.put(url, response);
   } catch {
     // The storage is full or not permitted: the page works without it.
   }
@@ -39,7 +39,7 @@ async function fromServer(event) {
   const { request } = event;
   try {
     const response = await fetch(request);
-    event.waitUntil(keep(request, response.clone()));
+    event.waitUntil(keep(withoutHash(request.url), response.clone()));
     return response;
   } catch (error) {
     const old = await kept(request);

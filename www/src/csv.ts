@@ -4,7 +4,7 @@ export type Cell = string | number | boolean | undefined;
 
 /**
  * Returns rows of cells as CSV. Texts, which may come from a file of anyone, are quoted where needed, and begin with an
- * apostrophe if a spreadsheet would take them for a formula.
+ * apostrophe if they would be treated as formulas.
  */
 export function csvOf(rows: readonly (readonly Cell[])[]): string {
   return `${rows.map((row) => row.map(cellText).join(',')).join('\n')}\n`;

@@ -164,7 +164,7 @@ class Labs {
   }
 
   async #passOn(passedOn: Handoff): Promise<void> {
-    // What a run has made goes with it.
+    // The surface of a run goes with it.
     if (!(await this.mayLeave(this.#lab?.work.unsavedByHand))) return;
     this.#remember();
     const kind = LABS.find(({ id }) => id === passedOn.lab) ?? LABS[0];

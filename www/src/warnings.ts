@@ -43,19 +43,3 @@ export function cellOf(warnings: readonly Warning[]): string {
   };
   return warnings.map(({ code, where }) => `${code}${where ? place(where) : ''}`).join('; ');
 }
-
-/** Returns the warnings in a value that comes from a file; those that are none are left out. */
-export function warningsIn(value: unknown): Warning[] {
-  return Array.isArray(value) ? value.filter(isWarning) : [];
-}
-
-function isWarning(value: unknown): value is Warning {
-  const { code, text: words, where } = Object(value) as Partial<Warning>;
-  return typeof code === 'string' && typeof words === 'string' && (where === undefined || isPlace(where));
-}
-
-function isPlace(value: unknown): value is Place {
-  const { frame, label, point } = Object(value) as { frame?: unknown; label?: unknown; point?: unknown };
-  if (typeof frame === 'number' || typeof label === 'number') return true;
-  return Array.isArray(point) && point.length === 3 && point.every((x) => typeof x === 'number');
-}

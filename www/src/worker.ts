@@ -13,7 +13,6 @@ import type {
   Measures,
   ParamValues,
   Plane,
-  PointArray,
   Ready,
   Requests,
   ReturnMessage,
@@ -398,22 +397,18 @@ class Session {
   }
 
   #setPlanes(planes: Plane[]): undefined {
+    const mesh = this.#run.isUnderWay ? undefined : this.#model?.mesh;
+    // Planes that cut no mesh are not kept, else all models after them would be refused.
+    const sections = mesh && planes.map((plane) => sectionOf(mesh, plane));
     this.#planes = planes;
-    if (this.#model && !this.#run.isUnderWay) {
-      const sections = this.#sections(this.#model.mesh);
-      send({ event: 'sections', sections }, buffersOf(sections));
-    }
-  }
-
-  #sections(mesh: Mesh): PointArray[] {
-    return this.#planes.map((plane) => sectionOf(mesh, plane));
+    if (sections) send({ event: 'sections', sections }, buffersOf(sections));
   }
 
   #snapshot(detail: Detail): void {
     const model = this.#current();
     const { mesh, level } = model;
     const surface = copySurface(this.#free.pop() ?? emptyArrays(), mesh);
-    const sections = this.#sections(mesh);
+    const sections = this.#planes.map((plane) => sectionOf(mesh, plane));
     const measures = detail === 'plain' ? undefined : this.#measure(mesh, detail === 'checked');
     const reports = this.#reports;
     this.#reports = [];

@@ -35,6 +35,9 @@ function describeEdited({ info }: Measures): string {
   return text('finish.edited', { vertices, triangles: plural('counts.triangle', info.triangles) });
 }
 
+/** Milliseconds until the user is told that a pause takes long, and can cancel it. */
+const PATIENCE_MS = 400;
+
 /** Messages about copied code, by the data that its function takes. */
 const COPIED = {
   files: 'sessions.codeCopied',
@@ -320,7 +323,21 @@ export abstract class RunLab<Example extends Listed> extends LabShell<Example> {
       this.beforeRun(text('labs.play'), false);
       this.work.did('run');
     }
-    this.ask(this.client.request(running ? 'pause' : 'play', undefined));
+    if (running) this.ask(this.#pause());
+    else this.ask(this.client.request('play', undefined));
+  }
+
+  /** Pauses the run. If a step takes so long that the worker does not answer, the user can cancel that. */
+  async #pause(): Promise<void> {
+    const pausing = this.client.request('pause', undefined);
+    const patience = setTimeout(() => this.states.load(text('labs.pausing')), PATIENCE_MS);
+    const isLoading = () => this.states.value === 'loading';
+    try {
+      await pausing;
+      if (isLoading()) this.states.restore(() => this.describe());
+    } finally {
+      clearTimeout(patience);
+    }
   }
 
   #step(steps: number): void {

@@ -24,7 +24,7 @@ export interface Handoff {
 
 /** A lab that is open, as the page controls it. */
 export interface Lab {
-  /** What the user has made and not saved. */
+  /** The work of the user that is not saved. */
   readonly work: Work;
   start(passedOn?: Handoff): Promise<void>;
   /** Releases the worker, GPU memory and event listeners. */

@@ -10,7 +10,7 @@ import type { Handoff } from './labs';
 import { LinkError, readLink } from './link-query';
 
 /** Milliseconds that a busy worker has to save its model before it is terminated because the user cancels. */
-const SAVE_TIMEOUT_MS = 1000;
+const SAVE_TIMEOUT_MS = 300;
 
 /**
  * Data that a lab opens (an example, the user's files, or data of another lab), with all that is needed to open it

@@ -1,4 +1,4 @@
-/** What a user has made in a lab and not saved, which is lost when the lab or the page is left. */
+/** Work of a user in a lab that is not saved, and is lost when the lab or the page is left. */
 import { text } from '../texts';
 
 /** Kinds of work: labels that were painted, edits of a surface, shapes that were deformed, and runs that were started. */

@@ -10,8 +10,11 @@ const ARRAYS = {
   ...{ Float32Array, Float64Array },
 };
 
-/** Value in JSON that stands for a typed array, whose bytes are a part, or for a number that JSON does not have. */
-type Stand = { $part: string; type: keyof typeof ARRAYS } | { $number: string };
+/** Value in JSON that stands for a typed array, whose bytes are a part. */
+interface ArrayStand {
+  $part: string;
+  type: keyof typeof ARRAYS;
+}
 
 /**
  * Returns a value as plain JSON, without properties that are undefined; adds the bytes of its typed arrays to `parts`,
@@ -32,16 +35,39 @@ export function encode(value: unknown, parts: Parts, path = ''): unknown {
   return Object.fromEntries(entries.map(([name, one]) => [name, encode(one, parts, below(name))]));
 }
 
+/** Most levels of objects and lists within each other; the deepest of a session, its poses in a log, have 14. */
+const DEEPEST = 32;
+const NUMBERS = ['NaN', 'Infinity', '-Infinity', '-0'];
+/** Names that an object has by itself: values under these could reach the prototypes of objects. */
+const RESERVED = ['__proto__', 'constructor', 'prototype'];
+
 /**
  * Returns the value that {@link encode} was given; `find` returns a part, or throws if there is none of that name. Throws a
- * TypeError or a RangeError for an array of unknown type or length.
+ * TypeError or a RangeError for what `encode` does not return: an array of unknown type or length, another number, a
+ * reserved name, or too many levels.
  */
-export function decode(value: unknown, find: (part: string) => Uint8Array): unknown {
+export function decode(value: unknown, find: (part: string) => Uint8Array, level = 0): unknown {
   if (typeof value !== 'object' || value === null) return value;
-  if (Array.isArray(value)) return value.map((one) => decode(one, find));
-  const stand = value as Partial<Stand>;
-  if ('$number' in stand) return Number(stand.$number);
+  if (level > DEEPEST) throw new RangeError('too many levels');
+  const below = (one: unknown) => decode(one, find, level + 1);
+  if (Array.isArray(value)) return value.map(below);
+  if ('$number' in value) return numberOf(value.$number);
+  if ('$part' in value) return arrayOf(value as Partial<ArrayStand>, find);
+  return Object.fromEntries(
+    Object.entries(value).map(([name, one]) => {
+      if (RESERVED.includes(name)) throw new TypeError('reserved name');
+      return [name, below(one)];
+    }),
+  );
+}
+
+function numberOf(name: unknown): number {
+  if (typeof name !== 'string' || !NUMBERS.includes(name)) throw new TypeError('unknown number');
+  return Number(name);
+}
+
+function arrayOf({ $part, type = 'Uint8Array' }: Partial<ArrayStand>, find: (part: string) => Uint8Array): unknown {
+  if (typeof $part !== 'string' || !Object.hasOwn(ARRAYS, type)) throw new TypeError('unknown array');
   // A copy of its own, since the part need not begin at a multiple of the size of its numbers.
-  if ('$part' in stand) return new ARRAYS[stand.type ?? 'Uint8Array'](find(String(stand.$part)).slice().buffer);
-  return Object.fromEntries(Object.entries(value).map(([name, one]) => [name, decode(one, find)]));
+  return new ARRAYS[type](find($part).slice().buffer);
 }

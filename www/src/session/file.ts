@@ -1,15 +1,14 @@
 /**
  * Sessions as files: a ZIP with `session.json` and binary parts; `docs/sessions.md` describes the format. Nothing of a file
- * is believed before it is checked, since it may come from anywhere.
+ * is used before it is checked, since it may come from anywhere.
  */
 import { strFromU8, strToU8, type Zippable, zipSync } from 'three/addons/libs/fflate.module.js';
 import { ArchiveTooLarge, MOST_FILES, unpack } from '../archive';
-import { LAB_IDS } from '../labs/address';
 import type { FileNotes, NamedBytes } from '../protocol';
 import { text } from '../texts';
-import { warningsIn } from '../warnings';
 import { decode, encode, type Parts } from './codec';
-import { INDEX, isRecord } from './recognise';
+import { INDEX } from './recognise';
+import { checked, type Session, shown } from './schema';
 
 const FORMAT = 'vesicle-session';
 /** Version of the format that is written; older ones are read. */
@@ -17,6 +16,11 @@ const VERSION = 1;
 
 /** Largest number of bytes that are unpacked. A session without its data is far below. */
 const MOST_BYTES = 2 ** 30;
+/** Largest size of `session.json` in bytes, and most values in it: the page does not answer while it is read. */
+const MOST_INDEX = 2 ** 27;
+const MOST_VALUES = 5e6;
+
+export type { Session };
 
 /** Description of a file of the data that a session was made with; `content` if the session includes it. */
 export interface SourceFile {
@@ -29,9 +33,9 @@ export interface SourceFile {
   notes?: FileNotes;
 }
 
-/** A lab as the user left it. */
-export interface Session {
-  lab: (typeof LAB_IDS)[number];
+/** A session that a lab has made, to be written. */
+export interface NewSession {
+  lab: Session['lab'];
   /** The settings in force, as the hash of a link. */
   hash: string;
   source: {
@@ -41,8 +45,8 @@ export interface Session {
     /** The files of the data; none if they are computed. */
     files: SourceFile[];
   };
-  /** The lab's own part: its model, history, undo and view. */
-  content: Record<string, unknown>;
+  /** The lab's own part of the session: its model, history, undo and view. */
+  content: object;
 }
 
 /** Returns SHA-256 of bytes in hexadecimal digits. */
@@ -63,12 +67,14 @@ export function describe(files: NamedBytes[], included: boolean): Promise<Source
 }
 
 /** Returns a session as the bytes of a file. */
-export async function writeSession({ lab, hash, source, content }: Session): Promise<Uint8Array> {
+export async function writeSession({ lab, hash, source, content }: NewSession): Promise<Uint8Array> {
   const parts: Parts = {};
   const body = encode({ lab, hash, source, ...content }, parts) as object;
   const sums = Object.entries(parts).map(async ([name, part]) => [name, await sha256(part)] as const);
   const index = { format: FORMAT, version: VERSION, ...body, parts: Object.fromEntries(await Promise.all(sums)) };
-  const files: Zippable = { [INDEX]: strToU8(JSON.stringify(index)) };
+  const packed = strToU8(JSON.stringify(index));
+  requireSize(packed);
+  const files: Zippable = { [INDEX]: packed };
   // Most data are compressed already.
   for (const [name, part] of Object.entries(parts)) files[name] = [part, { level: name.startsWith('source/') ? 0 : 1 }];
   return zipSync(files);
@@ -84,22 +90,40 @@ type Unpack = (archive: Uint8Array, mostBytes: number, refusal: string) => Parts
 export async function readSession(bytes: Uint8Array, unpacking: Unpack = unpack): Promise<Session> {
   const { [INDEX]: packed, ...parts } = await partsOf(bytes, unpacking);
   if (!packed) throw new Error(text('sessions.noIndex'));
-  const { version, parts: sums, ...body } = indexOf(strFromU8(packed));
-  if (typeof version === 'number' && version > VERSION)
-    throw new Error(text('sessions.newer', { version, known: VERSION }));
-  for (const [name, sum] of Object.entries(sums ?? {})) {
-    const part = parts[name];
-    if (!part) throw new Error(text('sessions.missingPart', { part: name }));
-    if ((await sha256(part)) !== sum) throw new Error(text('sessions.damagedPart', { part: name }));
-  }
+  requireSize(packed);
+  const { format: _, version, parts: sums, ...body } = indexOf(strFromU8(packed));
+  if (version > VERSION) throw new Error(text('sessions.newer', { version, known: VERSION }));
+  const verified = await verify(new Map(Object.entries(parts)), sums);
   const find = (name: string) => {
-    const part = Object.hasOwn(sums ?? {}, name) ? parts[name] : undefined;
+    const part = verified.get(name);
+    if (!part) throw new Error(text('sessions.missingPart', { part: shown(name) }));
     // Each part stands for one array, so that a small file cannot become many.
-    delete parts[name];
-    if (!part) throw new Error(text('sessions.missingPart', { part: name }));
+    verified.delete(name);
     return part;
   };
   return checked(decoded(body, find));
+}
+
+/** Throws an Error if a `session.json` is too large. */
+function requireSize(index: Uint8Array): void {
+  let values = 1;
+  // Each value but the first follows a comma or a bracket; those in texts are counted, too.
+  if (index.length <= MOST_INDEX)
+    for (const byte of index) if (byte === COMMA || byte === LIST || byte === OBJECT) values += 1;
+  if (index.length <= MOST_INDEX && values <= MOST_VALUES) return;
+  throw new Error(text('sessions.indexTooLarge', { megabytes: MOST_INDEX / 2 ** 20, millions: MOST_VALUES / 1e6 }));
+}
+
+/** Returns the parts that are listed, all of which have the checksums of the list. */
+async function verify(parts: Map<string, Uint8Array>, sums: Index['parts']): Promise<Map<string, Uint8Array>> {
+  const verified = new Map<string, Uint8Array>();
+  for (const [name, sum] of Object.entries(sums)) {
+    const part = parts.get(name);
+    if (!part) throw new Error(text('sessions.missingPart', { part: shown(name) }));
+    if ((await sha256(part)) !== sum) throw new Error(text('sessions.damagedPart', { part: shown(name) }));
+    verified.set(name, part);
+  }
+  return verified;
 }
 
 function decoded(body: unknown, find: (part: string) => Uint8Array): Record<string, unknown> {
@@ -121,45 +145,24 @@ async function partsOf(bytes: Uint8Array, unpacking: Unpack): Promise<Parts> {
 
 const TOO_LARGE = text('sessions.tooLarge', { parts: MOST_FILES, gigabytes: MOST_BYTES / 2 ** 30 });
 
-function indexOf(json: string): { version?: unknown; parts?: Record<string, string> } {
+/** Content of `session.json`: what it has besides these is the session itself. */
+interface Index {
+  version: number;
+  parts: Record<string, unknown>;
+}
+
+function indexOf(json: string): Index & Record<string, unknown> {
   let index: unknown;
   try {
     index = JSON.parse(json);
   } catch {
     throw new Error(text('sessions.badIndex'));
   }
-  if (!isRecord(index) || index.format !== FORMAT || !(Number(index.version) >= 1))
+  const { format, version, parts = {} } = isRecord(index) ? index : {};
+  if (format !== FORMAT || typeof version !== 'number' || !(version >= 1))
     throw new Error(text('sessions.otherFormat'));
-  return index as { version: number; parts: Record<string, string> };
-}
-
-/** Checks what all labs need of a session, and returns it. */
-function checked({ format: _, lab, hash, source, ...content }: Record<string, unknown>): Session {
-  const of = LAB_IDS.find((id) => id === lab);
-  if (!of) throw new Error(text('sessions.otherLab', { lab: String(lab) }));
-  const { name, example, files } = isRecord(source) ? source : {};
-  const isSound = typeof hash === 'string' && typeof name === 'string' && Array.isArray(files) && files.every(isFile);
-  if (!isSound) throw new Error(text('sessions.badIndex'));
-  const known = files.map((file: SourceFile) => ({ ...file, ...notesIn(file.notes) }));
-  return { lab: of, hash, source: { name, files: known, ...(typeof example === 'string' && { example }) }, content };
-}
-
-/** Returns the notes on a file that are sound. */
-function notesIn(value: unknown): { notes?: FileNotes } {
-  if (!isRecord(value)) return {};
-  const { warnings, remarks, space, inverted } = value;
-  const texts = Array.isArray(remarks) ? remarks.filter((one) => typeof one === 'string') : [];
-  const isLps = space === 'LPS' && { space: 'LPS' as const };
-  return {
-    notes: { warnings: warningsIn(warnings), remarks: texts, ...isLps, ...(inverted === true && { inverted }) },
-  };
-}
-
-function isFile(value: unknown): value is SourceFile {
-  if (!isRecord(value)) return false;
-  const { name, size, sha256, content } = value;
-  const isContent = content === undefined || content instanceof Uint8Array;
-  return typeof name === 'string' && typeof size === 'number' && typeof sha256 === 'string' && isContent;
+  if (!isRecord(parts)) throw new Error(text('sessions.badIndex'));
+  return { ...(index as object), version, parts };
 }
 
 /**
@@ -174,4 +177,11 @@ export async function matching(wanted: readonly SourceFile[], files: NamedBytes[
     const other = files.some((one) => one.name === name);
     throw new Error(text(other ? 'sessions.otherContent' : 'sessions.wanted', { name }));
   });
+}
+
+/** Bytes of `,`, `[` and `{`. */
+const [COMMA, LIST, OBJECT] = [0x2c, 0x5b, 0x7b];
+
+function isRecord(value: unknown): value is Record<string, unknown> {
+  return typeof value === 'object' && value !== null && !Array.isArray(value);
 }

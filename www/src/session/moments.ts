@@ -1,7 +1,5 @@
 /** Saved states of a lab, that of the present and those to undo and redo, as the content of a session. */
-import { text } from '../texts';
 import type { HistoryMark } from '../ui/history';
-import { isRecord } from './recognise';
 import { type PackedMark, ReportLists } from './reports';
 
 /** Most bytes of states to undo and redo in a session; the oldest are left out. */
@@ -51,31 +49,33 @@ function newest<M>(list: Labelled<M>[], most: number): Labelled<M>[] {
   return list.slice(first);
 }
 
-/**
- * Returns the saved states in the content of a session. `isMoment` tests what the lab itself needs of a state; throws an
- * Error if one lacks something.
- */
-export function unpackMoments<M extends Moment>(
-  content: Record<string, unknown>,
-  isMoment: (saved: Record<string, unknown>, page: Record<string, unknown>) => boolean,
-): Moments<M> {
-  const { undo, redo, reports } = content;
-  if (!isList(undo) || !isList(redo) || !isList(reports) || !reports.every(isList)) throw damaged();
-  const lists = new ReportLists(reports as ReportLists['lists'][number][]);
-  const unpack = (value: unknown): M => {
-    const { state, model, page } = isRecord(value) ? value : {};
-    const isSound = state instanceof Uint8Array && isRecord(model) && isRecord(page) && isMoment(model, page);
-    const mark = isSound && isRecord(page.history) && lists.unpack(page.history as unknown as PackedMark);
-    if (!isSound || !mark || typeof model.iteration !== 'number') throw damaged();
-    return { saved: { ...model, state }, page: { ...page, mark: () => mark } } as unknown as M;
-  };
-  const labelled = (list: unknown[]) =>
-    list.map((value): Labelled<M> => {
-      const state = unpack(value);
-      return { label: String((value as { label: unknown }).label), bytes: state.saved.state.length, state };
-    });
-  return { now: unpack(content), undo: labelled(undo), redo: labelled(redo) };
+/** A saved state in a session, with the position of its page's mark in the lists of reports. */
+interface PackedMoment<Model, Page> {
+  state: Uint8Array;
+  model: Model;
+  page: Page & { history: PackedMark };
 }
 
-const isList = (value: unknown): value is unknown[] => Array.isArray(value);
-const damaged = () => new Error(text('sessions.badIndex'));
+/** The content of a session with saved states. */
+interface Packed<Model, Page> extends PackedMoment<Model, Page> {
+  undo: (PackedMoment<Model, Page> & { label: string })[];
+  redo: (PackedMoment<Model, Page> & { label: string })[];
+  reports: ReportLists['lists'][number][];
+}
+
+interface Unpacked<Model, Page> {
+  saved: Model & { state: Uint8Array };
+  page: Page & { mark: () => HistoryMark };
+}
+
+/** Returns the saved states in the content of a session. */
+export function unpackMoments<Model, Page>(packed: Packed<Model, Page>): Moments<Unpacked<Model, Page>> {
+  const lists = new ReportLists(packed.reports);
+  const unpack = ({ state, model, page }: PackedMoment<Model, Page>): Unpacked<Model, Page> => ({
+    saved: { ...model, state },
+    page: { ...page, mark: () => lists.unpack(page.history) },
+  });
+  const labelled = (list: Packed<Model, Page>['undo']) =>
+    list.map(({ label, ...one }) => ({ label, bytes: one.state.length, state: unpack(one) }));
+  return { now: unpack(packed), undo: labelled(packed.undo), redo: labelled(packed.redo) };
+}

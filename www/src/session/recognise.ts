@@ -1,4 +1,6 @@
 /** Recognises sessions, without what reads them. */
+import { text } from '../texts';
+import type { ContentOf, Session } from './schema';
 
 /** Name of the file in a session that describes it. */
 export const INDEX = 'session.json';
@@ -12,21 +14,8 @@ export async function isSession(file: File): Promise<boolean> {
   return head === 'PK' && name === INDEX;
 }
 
-export function isRecord(value: unknown): value is Record<string, unknown> {
-  return typeof value === 'object' && value !== null && !Array.isArray(value);
-}
-
-/** Tests whether a value may be the log of a run, or that of a run whose beginning is not known. */
-export function isLog(value: unknown): boolean {
-  return value === undefined || (isRecord(value) && isRecord(value.setup) && Array.isArray(value.calls));
-}
-
-/** Passes the view of a session to `show`. A damaged one is left out: nothing else depends on it. */
-export function restoreView(view: unknown, show: (view: Record<string, unknown>) => void): void {
-  if (!isRecord(view)) return;
-  try {
-    show(view);
-  } catch {
-    // The view stays.
-  }
+/** Returns the content of a session that is opened in the lab `lab`, which is that of the session. */
+export function contentOf<Lab extends Session['lab']>(session: Session, lab: Lab): ContentOf<Lab> {
+  if (session.lab !== lab) throw new Error(text('sessions.otherLab', { lab: session.lab }));
+  return session.content as unknown as ContentOf<Lab>;
 }

@@ -22,9 +22,8 @@ export class ReportLists {
     return { list: this.lists.push(reports) - 1, iteration };
   }
 
-  /** Returns the mark that was packed; undefined for a list that does not exist. */
-  unpack({ list, iteration }: PackedMark): HistoryMark | undefined {
-    const reports = this.lists[list];
-    return reports && { reports, iteration };
+  /** Returns the mark that was packed. */
+  unpack({ list, iteration }: PackedMark): HistoryMark {
+    return { reports: this.lists[list] ?? [], iteration };
   }
 }

@@ -3,25 +3,32 @@ import { text } from '../texts';
 import { h, uniqueId } from './dom';
 import { bytes } from './format';
 
-/**
- * Servers that images may be read from, besides the page's own; the page's content-security policy (`index.html`) has the
- * same. A star stands for one part of a name or several.
- */
-export const SERVERS = [
-  'https://uk1s3.embassy.ebi.ac.uk',
-  'https://livingobjects.ebi.ac.uk',
-  'https://s3.amazonaws.com',
-  'https://*.s3.amazonaws.com',
-  'https://storage.googleapis.com',
-];
+/** Names of this computer that the policy of the worker permits; a policy cannot name an IPv6 address. */
+const LOOPBACK = ['localhost', '127.0.0.1'];
 
-/** Returns whether the page may read from an address. */
-export function mayReach({ origin, protocol, host }: URL, own = location.origin): boolean {
-  const fits = (server: string) => {
-    const [, domain] = server.split('*');
-    return domain === undefined ? origin === server : protocol === 'https:' && host.endsWith(domain);
-  };
-  return origin === own || SERVERS.some(fits);
+/**
+ * Returns why an image cannot be read from an address, or undefined if it can. The policy of the Extract lab's worker
+ * (`scripts/policy`) permits the same servers.
+ */
+export function addressProblem(
+  address: string,
+  page: Pick<Location, 'href' | 'origin'> = location,
+): string | undefined {
+  const url = parsed(address, page.href);
+  if (!url) return text('extractPanels.largeNoAddress');
+  const { protocol, username, password, host, hostname } = url;
+  if (!/^https?:$/.test(protocol)) return text('extractPanels.largeScheme', { scheme: protocol });
+  if (username || password) return text('extractPanels.largeCredentials');
+  const isSafe = protocol === 'https:' || url.origin === page.origin || LOOPBACK.includes(hostname);
+  return isSafe ? undefined : text('extractPanels.largeUnencrypted', { host });
+}
+
+function parsed(address: string, base: string): URL | undefined {
+  try {
+    return new URL(address, base);
+  } catch {
+    return undefined;
+  }
 }
 
 type Picker = { showDirectoryPicker?: () => Promise<FileSystemDirectoryHandle> };
@@ -55,14 +62,13 @@ export class LargeSourceControls {
       event.preventDefault();
       this.#openAddress();
     });
-    const servers = SERVERS.map((server) => server.replace('https://', '')).join(', ');
     this.element = h(
       'details',
       { class: 'large' },
       h('summary', {}, text('extractPanels.largeTitle')),
       form,
       ...this.#folderButton(),
-      h('p', { class: 'help', id: `${id}-help` }, text('extractPanels.largeHelp', { servers })),
+      h('p', { class: 'help', id: `${id}-help` }, text('extractPanels.largeHelp')),
       this.#progress,
     );
   }
@@ -86,13 +92,12 @@ export class LargeSourceControls {
   }
 
   #openAddress(): void {
-    const url = new URL(this.#address.value, location.href);
-    const isAllowed = mayReach(url);
-    this.#error.textContent = isAllowed ? '' : text('extractPanels.largeRefused', { host: url.host });
-    if (isAllowed) this.#address.removeAttribute('aria-invalid');
-    else this.#address.setAttribute('aria-invalid', 'true');
-    const name = url.pathname.split('/').filter(Boolean).at(-1) ?? url.host;
-    if (isAllowed) this.#onOpen(name, { zarr: url.href });
+    const problem = addressProblem(this.#address.value);
+    this.#error.textContent = problem ?? '';
+    this.#address.ariaInvalid = problem ? 'true' : null;
+    if (problem) return;
+    const { href, host, pathname } = new URL(this.#address.value, location.href);
+    this.#onOpen(pathname.split('/').filter(Boolean).at(-1) ?? host, { zarr: href });
   }
 
   /** Returns the button that picks a folder, in browsers that can. */

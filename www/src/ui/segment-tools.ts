@@ -42,17 +42,6 @@ export function usesRange({ tool, extent, inRange }: ToolSettings): boolean {
   return tool === 'threshold' || (tool === 'fill' && extent === 'box' && inRange);
 }
 
-/** Tests whether a value is one of the settings of tools. */
-export function isToolSettings(value: unknown): value is ToolSettings {
-  const { tool, shape, extent, range, ...others } = Object(value) as Record<string, unknown>;
-  const isRange = Array.isArray(range) && range.length === 2 && Number(range[0]) <= Number(range[1]);
-  const isChosen = TOOLS.some((one) => one.tool === tool) && ['ball', 'disc'].includes(String(shape));
-  const { radius, reach, inRange, protect } = others;
-  const isKnown =
-    typeof inRange === 'boolean' && typeof protect === 'boolean' && ['slice', 'box'].includes(String(extent));
-  return isRange && isChosen && isKnown && Number.isFinite(radius) && Number.isFinite(reach);
-}
-
 const UNDO = 'M8 5 2.5 10 8 15v-3.5h6a3.5 3.5 0 0 1 0 7H8V21h6a6 6 0 0 0 0-12H8z';
 const REDO = 'm16 5 5.5 5-5.5 5v-3.5h-6a3.5 3.5 0 0 0 0 7h6V21h-6a6 6 0 0 1 0-12h6z';
 

@@ -1,0 +1,96 @@
+/** Opening data in a lab: what is open after something could be opened in part only. */
+import { expect, test } from 'vitest';
+import { RequestError } from '../../www/src/channel';
+import { LabStates } from '../../www/src/labs/lab-states';
+import { Opening, type Source } from '../../www/src/labs/opening';
+import type { Session } from '../../www/src/session/file';
+
+type Example = { id: string };
+type Linked = { example?: string };
+type AnySource = Source<Example, Linked, string>;
+
+/** The page of a lab: its content, and the message in its banner. */
+class Page {
+  shown = '';
+  message = '';
+  restarts = 0;
+  readonly banner = {
+    show: (title: string, message = '') => {
+      this.message = `${title} ${message}`;
+    },
+    hide: () => {
+      this.message = '';
+    },
+  };
+  readonly states = new LabStates(
+    this.banner as never,
+    { say: () => undefined } as never,
+    new AbortController().signal,
+  );
+}
+
+/** A lab that shows the names of its data, and fails in the middle of those with an error in `faults`. */
+class NameOpening extends Opening<Example, Linked, string, string> {
+  protected readonly first = { id: 'first' };
+  readonly faults = new Map<string, Error>();
+  readonly #page: Page;
+
+  constructor(page: Page) {
+    const engine = {
+      restart: () => {
+        page.restarts += 1;
+      },
+      request: async () => ({ specs: [] }),
+    };
+    const ui = { makeParams: () => undefined, banner: page.banner, status: { say: () => undefined } };
+    super(engine, { ...ui, data: { choose: () => undefined } } as never, page.states);
+    this.#page = page;
+  }
+
+  protected find = (id: string) => ({ id });
+  protected linkedBy = () => undefined;
+  protected fromExample = (example: Example) => ({ name: example.id, load: async () => example.id, example });
+  protected fromFiles = ([file]: File[]) => ({ name: file?.name ?? '', load: async () => file?.name ?? '' });
+  protected load = async (_: AnySource, data: string) => data;
+  protected async adopt(opened: string, source: AnySource): Promise<void> {
+    this.#page.states.ready = true;
+    this.#page.shown = `half ${opened}`;
+    const fault = source.session && this.faults.get(source.session.source.name);
+    if (fault) throw fault;
+    this.#page.shown = opened;
+    this.#page.states.idle('');
+  }
+}
+
+const named = (name: string, example: string) => ({ source: { name, example, files: [] } }) as unknown as Session;
+const files = [new File([], 'mine')];
+
+test.each([
+  ['the page', new TypeError('no such view'), 0],
+  ['the engine', new RequestError({ code: 'internal', message: 'out of memory' }), 1],
+])(
+  'after a session that %s cannot show, what was open before is open, and other files open',
+  async (_, fault, restarts) => {
+    const page = new Page();
+    const opening = new NameOpening(page);
+    opening.faults.set('bad', fault);
+    await opening.files(files);
+    await opening.session(named('bad', 'other'), []);
+    expect(page).toMatchObject({ shown: 'mine', message: `bad could not be opened. ${fault.message}`, restarts });
+    expect(opening.source?.name).toBe('mine');
+    expect(page.states.value).toBe('paused');
+    await opening.session(named('good', 'other'), []);
+    expect(page).toMatchObject({ shown: 'other', message: '' });
+    await opening.session(named('bad', 'third'), []);
+    expect(page.shown).toBe('other');
+  },
+);
+
+test('after a session that cannot be shown in a lab with nothing open, the first example opens', async () => {
+  const page = new Page();
+  const opening = new NameOpening(page);
+  opening.faults.set('bad', new Error('no'));
+  await opening.session(named('bad', 'other'), []);
+  expect(page.shown).toBe('first');
+  expect(page.message).toContain('bad could not be opened');
+});

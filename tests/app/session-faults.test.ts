@@ -1,0 +1,103 @@
+/** Damaged sessions: each lab refuses them, keeps its content, and opens the next file. */
+
+import { readFile } from 'node:fs/promises';
+import type { Page } from 'playwright-core';
+import { strFromU8, strToU8, unzipSync, type Zippable, zipSync } from 'three/addons/libs/fflate.module.js';
+import { afterAll, beforeAll, expect, test } from 'vitest';
+import { at } from '../../scripts/shell.mjs';
+import { type App, afterRun, drop, LABS, open, openApp, QUICK, reach } from './browser';
+
+let app: App;
+/** A session of the Extract lab with its data. */
+let tooth: Uint8Array;
+
+beforeAll(async () => {
+  tooth = new Uint8Array(await readFile(at('tests/app/data/version-1.vesicle.zip')));
+  app = await openApp();
+});
+afterAll(async () => {
+  expect(app.complaints).toEqual([]);
+  await app.close();
+});
+
+// biome-ignore lint/suspicious/noExplicitAny: any part of the file may be damaged
+type Index = any;
+
+/** Returns the file of a session with `session.json` changed. */
+function withIndex(session: Uint8Array, change: (index: Index) => void): Uint8Array {
+  const files = unzipSync(session);
+  const index = JSON.parse(strFromU8(files['session.json'] ?? Uint8Array.of()));
+  change(index);
+  files['session.json'] = strToU8(JSON.stringify(index));
+  return zipSync(files as Zippable);
+}
+
+async function saved(page: Page): Promise<Uint8Array> {
+  const download = page.waitForEvent('download');
+  await page.click('[data-action=session]');
+  return new Uint8Array(await readFile(await (await download).path()));
+}
+
+const dropSession = (page: Page, bytes: Uint8Array) => drop(page, [{ name: 'a.vesicle.zip', bytes }]);
+const banner = (page: Page) => expect.poll(() => page.textContent('.banner:not([hidden]) [data-error]'));
+const facts = (page: Page) => page.textContent('.facts');
+
+test('a session with a damaged view is refused by name, and the file after it opens', async () => {
+  const { page } = app;
+  await open(app, QUICK.extract);
+  await reach(page, 'done');
+  const before = await facts(page);
+  const damaged = withIndex(tooth, ({ view }) => {
+    view.crosshair = ['x', 1, 2];
+  });
+  await dropSession(page, damaged);
+  await banner(page).toContain('view.crosshair[0] is not a number');
+  expect(await facts(page)).toBe(before);
+  const { 'source/files/0/content.bin': bytes = Uint8Array.of() } = unzipSync(tooth);
+  await afterRun(page, () => drop(page, [{ name: 'tooth.nrrd', bytes }]));
+  expect(await facts(page)).toContain('tooth.nrrd');
+});
+
+test('a session whose state is damaged leaves what is open, and gives up the one that waits for data', async () => {
+  const { page } = app;
+  await open(app, QUICK.extract);
+  await reach(page, 'done');
+  const before = await facts(page);
+  await dropSession(
+    page,
+    withIndex(tooth, ({ source }) => delete source.files[0].content),
+  );
+  await banner(page).toContain('Open tooth.nrrd');
+  await dropSession(
+    page,
+    withIndex(tooth, (index) => Object.assign(index, { state: index.undo[0].page, undo: [] })),
+  );
+  await banner(page).toContain('state is of the wrong kind');
+  // The same state as one of another method.
+  const other = withIndex(tooth, (index) => Object.assign(index, { state: index.source.files[0].content, undo: [] }));
+  await dropSession(
+    page,
+    withIndex(other, ({ source }) => Object.assign(source, { example: 'linked-rings', files: [] })),
+  );
+  await banner(page).toContain('not a saved state');
+  await page.waitForSelector('#lab[data-state=done], #lab[data-state=error]');
+  expect(await facts(page)).toBe(before);
+  await dropSession(page, tooth);
+  await expect.poll(() => facts(page)).toContain('tooth.nrrd');
+  await page.waitForSelector('.banner[hidden]', { state: 'attached' });
+});
+
+test.each(LABS)('%s: its own session opens, and with a camera nowhere it is refused', async (lab) => {
+  const { page } = app;
+  await open(app, QUICK[lab]);
+  await reach(page, 'running', 'done');
+  const session = await saved(page);
+  const damaged = withIndex(session, ({ view }) => {
+    view.camera.position[1] = { $number: 'NaN' };
+  });
+  await dropSession(page, damaged);
+  await banner(page).toContain('view.camera.position[1] is not a number');
+  await dropSession(page, session);
+  await page.waitForSelector('.banner[hidden]', { state: 'attached' });
+  await reach(page, 'paused', 'done');
+});

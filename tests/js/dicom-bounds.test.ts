@@ -1,0 +1,356 @@
+// `vesicle/dicom` with small files that would take much time or memory, or be read as something that they are not.
+import { readFileSync } from 'node:fs';
+import { deflateRawSync } from 'node:zlib';
+import { describe, expect, test } from 'vitest';
+import { type DicomListing, openDicom, readDicom } from '../../pkg/dicom/index.js';
+import { rejection } from './helpers.js';
+import { type Element, fileOf, shortElement, sorted, textElement } from './made-dicom.js';
+
+/** Differences from a usual image of bytes. */
+interface Image {
+  rows?: number;
+  columns?: number;
+  bits?: number;
+  frames?: number;
+  position?: string;
+  pixels?: Buffer;
+  more?: Element[];
+}
+
+const short = (tag: string, ...values: number[]) => shortElement('explicit', tag, ...values);
+const long = (tag: string, text: string): Element => textElement(tag, 'UT', text);
+const sequence = (tag: string, ...items: Element[][]): Element => ({ tag, vr: 'SQ', value: items });
+
+/** Returns the elements of an image, of which those in `more` replace others with the same tag. */
+function image({
+  rows = 1,
+  columns = 1,
+  bits = 8,
+  frames = 1,
+  position = '0\\0\\0',
+  pixels,
+  more = [],
+}: Image): Element[] {
+  const usual = [
+    textElement('00080018', 'UI', '1.2.3'),
+    textElement('00180088', 'DS', '2'),
+    textElement('0020000e', 'UI', '1.9'),
+    textElement('00200032', 'DS', position),
+    textElement('00200037', 'DS', '1\\0\\0\\0\\1\\0'),
+    textElement('00280008', 'IS', String(frames)),
+    ...[short('00280010', rows), short('00280011', columns), short('00280100', bits)],
+    textElement('00280030', 'DS', '1\\1'),
+    { tag: '7fe00010', vr: 'OB', value: pixels ?? Buffer.alloc(Math.ceil((rows * columns * bits * frames) / 8)) },
+  ];
+  return sorted([...usual.filter(({ tag }) => !more.some((one) => one.tag === tag)), ...more]);
+}
+
+const file = (elements: Element[], k = 0, uid?: string) => ({
+  name: `file ${k}`,
+  bytes: new Uint8Array(fileOf(elements, 'explicit', uid)),
+});
+
+const DEFLATED = '1.2.840.10008.1.2.1.99';
+/** Returns a file whose data set is compressed as a whole. */
+function deflated(elements: Element[]) {
+  const [meta, whole] = [fileOf([], 'explicit', DEFLATED), fileOf(elements, 'explicit', DEFLATED)];
+  return {
+    name: 'deflated',
+    bytes: new Uint8Array(Buffer.concat([meta, deflateRawSync(whole.subarray(meta.length))])),
+  };
+}
+
+/** Runs `work`, which must take less than `most` seconds of this process. */
+async function within<Result>(most: number, work: () => Promise<Result>): Promise<Result> {
+  const before = process.cpuUsage();
+  const result = await work();
+  const { user, system } = process.cpuUsage(before);
+  expect((user + system) / 1e6).toBeLessThan(most);
+  return result;
+}
+
+const reasons = ({ skipped }: DicomListing) => skipped.map(({ reason }) => reason);
+
+const RLE = '1.2.840.10008.1.2.5';
+/** Returns compressed pixel data of fragments, the last of which states its length. */
+const fragments = (parts: Buffer[], stated?: number): Element => ({
+  ...{ tag: '7fe00010', vr: 'OB', isOpen: true },
+  value: Buffer.concat([
+    Buffer.from('feff00e000000000', 'hex'),
+    ...parts.flatMap((part, k) => {
+      const head = Buffer.from('feff00e000000000', 'hex');
+      head.writeUInt32LE(k === parts.length - 1 ? (stated ?? part.length) : part.length, 4);
+      return [head, part];
+    }),
+  ]),
+});
+const refused = async (element: Element, size: Image, uid: string) => {
+  const files = [0, 1].map((z) => {
+    const more = [element, textElement('00080018', 'UI', `1.${z}`)];
+    return file(image({ ...size, position: `0\\0\\${z}`, more }), z, uid);
+  });
+  const error = await within(2, () => rejection(readDicom(files)));
+  return `${error.code} ${error.message}`;
+};
+
+describe('files of very many', () => {
+  test('frames are opened and read in little time', async () => {
+    const { data } = await within(4, () => readDicom(file(image({ frames: 99_000 }))));
+    expect(data).toHaveLength(99_000);
+    const offsets = long('3004000c', Array.from({ length: 15_000 }, (_, k) => k).join('\\'));
+    const { dims } = await within(4, () => readDicom(file(image({ frames: 15_000, more: [offsets] }))));
+    expect(dims).toEqual([1, 1, 15_000]);
+  });
+
+  test('frames that they do not have are skipped', async () => {
+    const lie = image({ frames: 100_000, pixels: Buffer.alloc(10) });
+    const listing = await within(2, () => openDicom(Array.from({ length: 100 }, (_, k) => file(lie, k))));
+    expect(reasons(listing)[99]).toMatch(/pixel data: 100000 images need 100000 bytes, it has 10/);
+  });
+
+  test('frames of a bit, several of them, are skipped', async () => {
+    const bits = Array.from({ length: 7 }, (_, k) => {
+      const uid = textElement('00080018', 'UI', `1.2.${k}`);
+      return file(image({ bits: 1, frames: 100_000, position: `0\\0\\${k * 1e6}`, more: [uid] }), k);
+    });
+    const listing = await within(5, () => openDicom(bits));
+    expect(reasons(listing)).toEqual(Array.from({ length: 6 }, () => 'too many images of very few voxels'));
+    expect(listing.volumes[0]?.warnings[0]?.text).toMatch(/could not be read, and may be missing/);
+  });
+
+  test('nested sequences, or empty items', async () => {
+    const open = Buffer.from('0800401153510000fffffffffeff00e0ffffffff', 'hex');
+    const nested = {
+      tag: '00081140',
+      vr: 'OB',
+      value: Buffer.concat(Array.from({ length: 10_000 }, () => open)),
+      length: 0,
+    };
+    expect(reasons(await openDicom(file(image({ more: [nested] }))))[0]).toMatch(/sequences are nested too deeply/);
+    const many = sequence('00081140', ...Array.from({ length: 100_000 }, () => []));
+    expect(reasons(await within(3, () => openDicom(file(image({ more: [many] })))))[0]).toMatch(/a single image/);
+  });
+
+  test('items or zeros in a compressed data set', async () => {
+    const empty = Buffer.alloc(16e6, Buffer.from('feff00e000000000', 'hex'));
+    const bomb = deflated(image({ more: [{ tag: '00081140', vr: 'SQ', value: empty }] }));
+    expect(bomb.bytes.length).toBeLessThan(1e5);
+    expect(reasons(await within(3, () => openDicom(bomb)))[0]).toMatch(/more elements than a file of its size/);
+    const zeros = deflated(image({ rows: 60_000, columns: 6000, bits: 1, frames: 2, pixels: Buffer.alloc(1e7) }));
+    expect(reasons(await openDicom(zeros))[0]).toMatch(/2 images need 90000000 bytes, it has 10000000/);
+  });
+
+  test('digits, or signs that separate names', async () => {
+    const digits = long('00180050', `${'1'.repeat(90_000)}x`);
+    const names = long('00100010', `${'='.repeat(90_000)}\n`);
+    await within(1, () => openDicom(file(image({ more: [digits, names] }))));
+  });
+
+  test('characters in names and messages', async () => {
+    const text = 'n'.repeat(30_000);
+    const more = [
+      ...[long('0008103e', text), long('00080060', text), long('00100010', text), long('00541001', text)],
+      ...[long('00181210', text), long('00280004', `RGB${text}`)],
+    ];
+    const color = await openDicom(file(image({ more })));
+    expect(color.skipped[0]?.reason.length).toBeLessThan(200);
+    const slices = [0, 1, 2, 3].map((z) =>
+      file(
+        image({
+          position: `0\\0\\${z}`,
+          more: [...more.slice(0, 4), textElement('00080018', 'UI', `1.2.${z}`), long('00181210', `${z % 2}${text}`)],
+        }),
+        z,
+      ),
+    );
+    const { volumes } = await openDicom(slices);
+    expect(volumes).toHaveLength(2);
+    for (const { name, patient, modality, remarks } of volumes)
+      for (const one of [name, patient, modality, ...remarks]) expect(one.length).toBeLessThan(300);
+    expect((await rejection(readDicom(slices))).message.length).toBeLessThan(2000);
+    const broken = Array.from({ length: 300 }, (_, k) => ({ name: `${k}${text}.dcm`, bytes: new Uint8Array(9) }));
+    expect((await rejection(readDicom(broken))).message.length).toBeLessThan(2000);
+  });
+});
+
+describe('texts that are names of something else', () => {
+  test('as character set and transfer syntax', async () => {
+    const set = image({ more: [textElement('00080005', 'CS', 'constructor')] });
+    expect(reasons(await openDicom(file(set)))).toEqual(['a single image, which is no volume']);
+    const text = await refused(fragments([Buffer.alloc(80)]), {}, '1.2.840.10008.1.2.constructor');
+    expect(text).toMatch(/^bad-file .*constructor is not supported/);
+  });
+});
+
+describe('values are those of the file', () => {
+  test("in Node's buffers, which may be parts of others", async () => {
+    const bytes = fileOf(image({ frames: 2, pixels: Buffer.from([7, 9]) }), 'explicit');
+    const part = Buffer.concat([Buffer.alloc(33, 5), bytes]).subarray(33);
+    expect([...(await readDicom({ name: 'x', bytes: part })).data]).toEqual([7, 9]);
+  });
+
+  test('and not what follows the pixels', async () => {
+    const after = { tag: 'fffcfffc', vr: 'OB', value: Buffer.alloc(100, 1) };
+    const one = image({ columns: 9, pixels: Buffer.from([1, 2]), more: [after] });
+    const files = [0, 1].map((z) =>
+      file(
+        [
+          ...one.filter(({ tag }) => tag !== '00080018' && tag !== '00200032'),
+          textElement('00080018', 'UI', `1.${z}`),
+          textElement('00200032', 'DS', `0\\0\\${z}`),
+        ].toSorted((a, b) => (a.tag < b.tag ? -1 : 1)),
+        z,
+      ),
+    );
+    expect((await rejection(readDicom(files))).message).toMatch(/pixel data: needs 9 bytes, has 2/);
+  });
+
+  test('if numbers are of another type, or no numbers', async () => {
+    const two = (more: Element[]) => openDicom(file(image({ frames: 2, more })));
+    const { volumes } = await two([textElement('00280010', 'IS', '1'), textElement('00280100', 'DS', '8')]);
+    expect(volumes[0]?.dims).toEqual([1, 1, 2]);
+    for (const text of ['NaN', 'Infinity', '1e999', '0x10', '1e31'])
+      expect(reasons(await two([textElement('00200032', 'DS', `0\\0\\${text}`)]))[0]).toMatch(/without position/);
+    const cut = { tag: '00280103', vr: 'US', value: Buffer.alloc(0) };
+    expect((await two([cut])).volumes).toHaveLength(1);
+  });
+
+  test('if images between others are near both of them', async () => {
+    const places = ['0\\0\\5', '0.095\\0\\0', '-0.095\\0\\0'];
+    const files = places.map((position, k) =>
+      file(image({ position, more: [textElement('00080018', 'UI', `1.${k}`)] }), k),
+    );
+    expect(reasons(await openDicom(files))).toContain(
+      'several images at the same position, without any attribute that distinguishes them',
+    );
+  });
+});
+
+describe('compressed images', () => {
+  test('with fragments longer than their file', async () => {
+    const text = await refused(fragments([Buffer.alloc(80), Buffer.alloc(80)], 0xfffffff0), {}, RLE);
+    expect(text).toMatch(/^bad-file DICOM: file 0: could not be read: .*overrun/);
+  });
+
+  test('that cannot hold so many voxels', async () => {
+    const large = { rows: 5000, columns: 4000 };
+    expect(await refused(fragments([Buffer.alloc(80)]), large, RLE)).toMatch(
+      /voxels are more than 80 compressed bytes/,
+    );
+    const jpeg = await refused(fragments([Buffer.alloc(80)]), large, '1.2.840.10008.1.2.4.50');
+    expect(jpeg).toMatch(/voxels are more than 80 compressed bytes/);
+  });
+
+  test('of another size than their file says, before they are decoded', async () => {
+    for (const name of ['jpeg', 'jpeg-lossless', 'jpeg-ls', 'jpeg-2000', 'htj2k']) {
+      const bytes = new Uint8Array(readFileSync(`tests/data/dicom/${name}.dcm`));
+      const isWavelet = name === 'jpeg-2000' || name === 'htj2k';
+      const markers = isWavelet ? [0x51] : [0xc0, 0xc3, 0xf7];
+      const at = bytes.findIndex((byte, k) => k > 1000 && byte === 0xff && markers.includes(bytes[k + 1] ?? 0));
+      // The high bytes of the height.
+      bytes.set([0xff, 0xf0], isWavelet ? at + 10 : at + 5);
+      const error = await within(2, () => rejection(readDicom({ name, bytes })));
+      expect(error.message, name).toMatch(/the compressed image has .* the file states 16 × 12 of 1/);
+    }
+  });
+
+  test('with fewer samples than pixels, for the rest of which a decoder would wait', async () => {
+    for (const name of ['jpeg-2000', 'htj2k']) {
+      const bytes = new Uint8Array(readFileSync(`tests/data/dicom/${name}.dcm`));
+      const at = bytes.findIndex((byte, k) => k > 1000 && byte === 0xff && bytes[k + 1] === 0x51);
+      bytes[at + 42] = 49;
+      expect((await rejection(readDicom({ name, bytes }))).message).toMatch(/has 16 × 1 pixels of 1 samples/);
+    }
+  });
+});
+
+describe('segmentations', () => {
+  const SEGMENTATION = textElement('00080016', 'UI', '1.2.840.10008.5.1.4.1.1.66.4');
+  interface Frame {
+    position: string;
+    segment?: number;
+    directions?: string;
+  }
+
+  /** Returns a segmentation of bytes that are 1 everywhere. */
+  function segmentation(frames: Frame[], size: Image = {}, more: Element[] = []) {
+    const groups = frames.map(({ position, segment, directions = '1\\0\\0\\0\\1\\0' }) => [
+      sequence('00209113', [textElement('00200032', 'DS', position)]),
+      sequence('00209116', [textElement('00200037', 'DS', directions)]),
+      ...(segment === undefined ? [] : [sequence('0062000a', [short('0062000b', segment)])]),
+    ]);
+    const { rows = 1, columns = 1 } = size;
+    const pixels = Buffer.alloc(rows * columns * frames.length, 1);
+    return file(
+      image({
+        rows,
+        columns,
+        frames: frames.length,
+        pixels,
+        more: [SEGMENTATION, sequence('52009230', ...groups), ...more],
+      }),
+    );
+  }
+
+  test('with numbers above 255 that are not described keep them, with a warning', async () => {
+    const { data, warnings } = await readDicom(
+      segmentation([0, 1].map((z) => ({ position: `0\\0\\${z}`, segment: 300 + z }))),
+    );
+    expect([...data]).toEqual([300, 301]);
+    expect(warnings?.map(({ text }) => text)).toEqual(['Segments that the file does not describe: 300, 301.']);
+  });
+
+  test('whose frames name no segment have the only one, or a warning', async () => {
+    const frames = [{ position: '0\\0\\0' }, { position: '0\\0\\1' }];
+    const one = sequence('00620002', [short('00620004', 7)]);
+    const described = await readDicom(segmentation(frames, {}, [one]));
+    expect([[...described.data], described.warnings?.[0]?.text]).toEqual([
+      [7, 7],
+      expect.stringMatching(/^2 frames name no segment: their voxels have label 7/),
+    ]);
+  });
+
+  test('whose stated distance of slices is far larger than that of frames', async () => {
+    const frames = [0, 1, 2].map((z) => ({ position: `0\\0\\${z}`, segment: 1 }));
+    const { dims } = await readDicom(segmentation(frames, {}, [textElement('00180088', 'DS', '50')]));
+    expect(dims).toEqual([1, 1, 3]);
+  });
+
+  test('whose frames are no stack are skipped', async () => {
+    const turned = [
+      { position: '0\\0\\0', segment: 1 },
+      { position: '0\\0\\1', segment: 1, directions: '0\\1\\0\\0\\0\\1' },
+    ];
+    expect(reasons(await openDicom(segmentation(turned)))[0]).toMatch(/frames of several orientations/);
+    const tiles = [0, 1].map((x) => ({ position: `${x}\\0\\0`, segment: 1 }));
+    expect(reasons(await openDicom(segmentation(tiles)))[0]).toMatch(/shifted sideways/);
+  });
+
+  test('of few frames far apart take no more memory than there is', async () => {
+    const frames = [0, 1, 60_000].map((z) => ({ position: `0\\0\\${z}`, segment: 1 }));
+    const step = textElement('00180088', 'DS', '1');
+    const error = await within(2, () =>
+      rejection(readDicom(segmentation(frames, { rows: 150, columns: 150 }, [step]))),
+    );
+    expect([error.code, error.message]).toEqual(['too-large', expect.stringMatching(/1350022500 bytes are more than/)]);
+  });
+
+  test('with names of any characters and any length, of which the first of a number counts', async () => {
+    const name = (text: string) => textElement('00620005', 'UT', text, 'utf8');
+    const segments = sequence(
+      '00620002',
+      [short('00620004', 1), name('Größe 漢')],
+      [short('00620004', 1), name('b')],
+      [...[short('00620004', 2), name('🫀'.repeat(10_000))]],
+    );
+    const utf8 = textElement('00080005', 'CS', 'ISO_IR 192');
+    const frames = [
+      { position: '0\\0\\0', segment: 1 },
+      { position: '0\\0\\1', segment: 2 },
+    ];
+    const { volumes } = await openDicom(segmentation(frames, {}, [segments, utf8]));
+    const [first, second] = volumes[0]?.segments ?? [];
+    expect([first?.name, volumes[0]?.segments.length]).toEqual(['Größe 漢', 2]);
+    expect(second?.name).toMatch(/^🫀{90,100}…$/u);
+  });
+});
