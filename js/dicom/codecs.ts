@@ -111,10 +111,25 @@ const instances = new Map<unknown, Promise<Decode>>();
 
 function loaded(codec: Codec, source: DecoderSource = installed(codec)): Promise<Decode> {
   const key = source.load;
-  const made = instances.get(key) ?? instantiated(codec, source);
+  const made = instances.get(key) ?? guarded(instantiated(codec, source), () => instances.delete(key));
   instances.set(key, made);
-  made.catch(() => instances.delete(key));
   return made;
+}
+
+/** Returns a decoder that is forgotten when it fails: its memory may then be damaged, and with it all later images. */
+async function guarded(making: Promise<Decode>, forget: () => void): Promise<Decode> {
+  const failed = (error: unknown): never => {
+    forget();
+    throw error;
+  };
+  const decode = await making.catch(failed);
+  return (bytes) => {
+    try {
+      return decode(bytes);
+    } catch (error) {
+      return failed(error);
+    }
+  };
 }
 
 /** Decoders that Node finds. */

@@ -10,6 +10,7 @@ import { statedSize } from './stated-size.js';
 import type { Frame, PixelFormat } from './types.js';
 
 const RLE = '1.2.840.10008.1.2.5';
+const JPEG_LS = ['1.2.840.10008.1.2.4.80', '1.2.840.10008.1.2.4.81'];
 
 /** The type of array for stored values of a format. */
 export function arrayOf({ bitsAllocated, signed, float }: PixelFormat): new (length: number) => VoxelArray {
@@ -52,6 +53,9 @@ export class PixelReader {
     const decode: Decode =
       transferSyntax === RLE ? (bytes) => decodeRle(bytes, voxels) : await decoderOf(transferSyntax, this.#decoders);
     checkSize(image, packed);
+    // Its decoder searches the end in gigabytes of memory.
+    if (JPEG_LS.includes(transferSyntax) && !hasEnd(packed, packed.length))
+      throw badDicom(image.file.name, 'the compressed image could not be decoded: it has no end');
     try {
       const decoded = decode(packed);
       if (decoded.lossy) this.lossy.add(image.file.name);
@@ -163,8 +167,8 @@ function checkSize({ format, file }: Frame, packed: Uint8Array): void {
 }
 
 /** Whether a compressed image has the marker that ends images of the JPEG family, before padding. */
-function hasEnd(bytes: Uint8Array): boolean {
-  const tail = bytes.subarray(-END);
+function hasEnd(bytes: Uint8Array, within = END): boolean {
+  const tail = bytes.subarray(-within);
   return tail.some((byte, k) => byte === 0xff && tail[k + 1] === 0xd9);
 }
 

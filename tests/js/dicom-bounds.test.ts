@@ -262,6 +262,24 @@ describe('compressed images', () => {
       expect((await rejection(readDicom({ name, bytes }))).message).toMatch(/has 16 × 1 pixels of 1 samples/);
     }
   });
+
+  test('without an end are refused by JPEG-LS, whose decoder would search it for long', async () => {
+    const bytes = new Uint8Array(readFileSync('tests/data/dicom/jpeg-ls.dcm'));
+    bytes[bytes.lastIndexOf(0xd9)] = 0;
+    expect((await rejection(readDicom({ name: 'x', bytes }))).message).toMatch(/could not be decoded: it has no end/);
+  });
+
+  test('that damaged the memory of a decoder do not damage later ones', async () => {
+    for (const name of ['jpeg-ls', 'jpeg-2000', 'htj2k', 'jpeg', 'jpeg-lossless']) {
+      const whole = new Uint8Array(readFileSync(`tests/data/dicom/${name}.dcm`));
+      const { data } = await readDicom({ name, bytes: whole });
+      for (let at = 1100; at < whole.length - 20; at += 7) {
+        const bytes = whole.map((byte, k) => (k === at ? byte ^ 0x7f : byte));
+        await readDicom({ name, bytes }).catch(() => {});
+      }
+      expect((await readDicom({ name, bytes: whole })).data, name).toEqual(data);
+    }
+  });
 });
 
 describe('segmentations', () => {

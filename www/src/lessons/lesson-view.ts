@@ -25,7 +25,7 @@ export class LessonView {
   readonly #lab: HTMLElement;
   #progress: Progress;
   /** Says that the progress is not kept. */
-  readonly #notKept = h('p', { class: 'field-error', role: 'alert' });
+  readonly #notKept = h('p', { class: 'not-kept', role: 'alert' });
   readonly #steps = h('ol', { class: 'lesson-steps' });
   readonly #body = h('div', { class: 'lesson-step' });
   readonly #news = h('p', { class: 'visually-hidden', role: 'status' });
