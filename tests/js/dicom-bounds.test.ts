@@ -142,7 +142,7 @@ describe('files of very many', () => {
 
   test('digits, or signs that separate names', async () => {
     const digits = long('00180050', `${'1'.repeat(90_000)}x`);
-    const names = long('00100010', `${'='.repeat(90_000)}\n`);
+    const names = long('00100010', `${'='.repeat(90_000)}\nx`);
     await within(1, () => openDicom(file(image({ more: [digits, names] }))));
   });
 
