@@ -32,10 +32,28 @@ function choose(name: string, bytes: Uint8Array): Promise<void> {
   return input.setInputFiles({ name, mimeType: '', buffer: Buffer.from(bytes) });
 }
 
+test('an edit that is asked for before the surface is open is made when it is', async () => {
+  const whole = await measures(app.page);
+  // Before the panel knows that it was unfolded.
+  await app.page.evaluate(() => {
+    const panel = document.querySelector('.finish');
+    panel?.closest('details')?.setAttribute('open', '');
+    panel?.querySelector<HTMLButtonElement>('[data-finish=cut]')?.click();
+  });
+  await expect.poll(async () => (await log()).length).toBe(1);
+  expect((await measures(app.page)).volume / whole.volume).toBeCloseTo(0.5, 1);
+  await press('undo');
+  await expect.poll(async () => (await log()).length).toBe(0);
+  expect(await app.page.isDisabled('[data-finish=redo]')).toBe(false);
+  await app.page.getByRole('heading', { name: 'Edit the surface' }).click();
+});
+
 test('edits change the surface, its measures and the saved files; undo and redo', async () => {
   const before = await measures(app.page);
   expect(before.components).toBeGreaterThan(1);
   await unfold('Edit the surface');
+  // The list moves the buttons below it.
+  await app.page.waitForSelector('[data-component]');
   await press('keep-largest');
   await expect.poll(async () => (await measures(app.page)).components).toBe(1);
   await press('cut');

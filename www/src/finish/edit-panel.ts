@@ -34,8 +34,8 @@ export class EditPanel {
   readonly #code = h('pre', { class: 'code', tabindex: 0, 'aria-label': text('finish.code') });
   readonly #codeHolder: HTMLElement;
   readonly #distance = h('p', { class: 'help', role: 'status', 'data-finish': 'distance' });
-  readonly #undo = this.#button('undo', text('controls.undo'), () => this.#change('undo', undefined));
-  readonly #redo = this.#button('redo', text('controls.redo'), () => this.#change('redo', undefined));
+  readonly #undo = this.#button('undo', text('controls.undo'), () => this.#change('undo'));
+  readonly #redo = this.#button('redo', text('controls.redo'), () => this.#change('redo'));
   readonly #cancel = h(
     'button',
     { type: 'button', 'data-finish': 'cancel', disabled: true, onclick: () => this.#finishing.cancel() },
@@ -54,7 +54,9 @@ export class EditPanel {
   #from: SurfacePoint | undefined;
   #enabled = false;
   #unfolded = false;
-  #busy = false;
+  /** Number of works in progress, and of those during which no other may begin. */
+  #working = 0;
+  #blocking = 0;
 
   constructor(finishing: Finishing, view: EditedView) {
     this.#finishing = finishing;
@@ -124,8 +126,9 @@ export class EditPanel {
   }
 
   async #open(): Promise<void> {
-    if (this.#enabled && this.#unfolded && !this.#busy && !this.#finishing.edited)
-      await this.#attempt(() => this.#finishing.open());
+    if (!this.#enabled || !this.#unfolded || this.#working > 0 || this.#finishing.edited) return;
+    // Controls stay enabled meanwhile: a button that is disabled while it is pressed loses the click.
+    await this.#attempt(() => this.#finishing.open(), false);
   }
 
   #operations(): HTMLElement[] {
@@ -146,7 +149,7 @@ export class EditPanel {
       ],
       () => void this.#preview(),
     );
-    const edit = (name: string, label: string, make: () => Edit) => this.#button(name, label, () => this.#edit(make()));
+    const edit = (name: string, label: string, make: () => Edit) => this.#button(name, label, () => this.#edit(make));
     const keep = (indices: number[]): Edit => ({ op: 'keepComponents', indices });
     return [
       group(text('finish.sampling'), this.#decimationForm.element, [
@@ -213,39 +216,43 @@ export class EditPanel {
 
   #enable(): void {
     const { edited } = this.#finishing;
-    const idle = this.#enabled && !this.#busy;
-    this.element.setAttribute('aria-busy', String(this.#busy));
+    const idle = this.#enabled && this.#blocking === 0;
+    this.element.setAttribute('aria-busy', String(this.#working > 0));
     for (const button of this.#buttons) button.disabled = !idle;
     this.#undo.disabled ||= !edited?.undoable;
     this.#redo.disabled ||= !edited?.undone.length;
-    this.#cancel.disabled = !this.#busy;
+    this.#cancel.disabled = this.#working === 0;
     this.#choosing.disabled = !idle;
     this.#measuring.disabled = !idle;
   }
 
-  #edit(edit: Edit): Promise<void> {
-    return this.#change('edit', edit);
+  /** Makes an edit; `make` is called when the surface is open, as most edits depend on it. */
+  #edit(make: () => Edit): Promise<void> {
+    return this.#change('edit', make);
   }
 
-  async #change(kind: 'edit' | 'undo' | 'redo', edit: Edit | undefined): Promise<void> {
+  async #change(kind: 'edit' | 'undo' | 'redo', make: () => Edit | undefined = () => undefined): Promise<void> {
     await this.#attempt(async () => {
-      await this.#finishing.change(kind, edit as never);
+      await this.#finishing.open();
+      await this.#finishing.change(kind, make() as never);
       const { info } = this.#finishing.edited?.measures ?? {};
       if (info)
         this.#status.textContent = text('finish.done', { triangles: plural('counts.triangle', info.triangles) });
     });
   }
 
-  /** Does some work; an error is shown, and nothing else changes. Returns whether it was done. */
-  async #attempt(work: () => Promise<unknown>): Promise<boolean> {
+  /**
+   * Does some work, and no other meanwhile unless it is not `blocking`; an error is shown, and nothing else changes.
+   * Returns whether it was done.
+   */
+  async #attempt(work: () => Promise<unknown>, blocking = true): Promise<boolean> {
     this.#error.textContent = '';
     this.#status.textContent = text('finish.working');
     const focused = document.activeElement;
-    this.#busy = true;
-    this.#enable();
+    this.#count(1, blocking);
     try {
       await work();
-      if (this.#status.textContent === text('finish.working')) this.#status.textContent = '';
+      if (this.#working === 1 && this.#status.textContent === text('finish.working')) this.#status.textContent = '';
       return true;
     } catch (error) {
       const reason = error instanceof Error ? error.message : String(error);
@@ -253,12 +260,17 @@ export class EditPanel {
       this.#error.textContent = isCancelled(error) ? '' : text('finish.refused', { reason });
       return false;
     } finally {
-      this.#busy = false;
-      this.#enable();
+      this.#count(-1, blocking);
       // Buttons lose the focus when they are disabled, as Cancel is now.
       const isLost = document.activeElement === document.body || document.activeElement === this.#cancel;
       if (isLost && focused instanceof HTMLElement) focused.focus();
     }
+  }
+
+  #count(change: 1 | -1, blocking: boolean): void {
+    this.#working += change;
+    if (blocking) this.#blocking += change;
+    this.#enable();
   }
 
   #remesh(): Edit {
@@ -283,7 +295,7 @@ export class EditPanel {
   }
 
   async #preview(): Promise<void> {
-    if (!this.#enabled || this.#busy) return;
+    if (!this.#enabled || this.#blocking > 0) return;
     await this.#attempt(async () => {
       await this.#finishing.open();
       this.#view.showLines(await this.#finishing.request('section', this.#plane()));
