@@ -19,6 +19,7 @@ use crate::math::order::sort_distinct;
 use crate::math::predicates::collinear;
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::mesh::{Facet, facets_intersect};
+use crate::methods::slices::Pauses;
 use smallvec::SmallVec;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -27,6 +28,8 @@ use std::collections::{BTreeMap, BinaryHeap};
 const TILE: f64 = 8.0;
 /// Largest distance of two cells that are merged, in edge lengths.
 const MERGED: f32 = 1.0;
+/// Work that a tile counts as.
+const TILE_WORK: usize = 50;
 /// Length of the longest edge that merges may create, in edge lengths.
 const LONGEST: f32 = 1.5;
 /// Weight of the squared distance of the remaining vertex from the planes of the triangles that are replaced, relative to
@@ -129,7 +132,15 @@ impl Coarsening {
 
     /// Coarsens the tiles of a pass that overlap a box, or restores them if they are to be coarsened later; returns the box
     /// of all of them.
-    fn run_pass(&mut self, pass: usize, nets: &Nets, edge: f64, area: &CellBox, later: bool) -> CellBox {
+    async fn run_pass(
+        &mut self,
+        pass: usize,
+        nets: &Nets,
+        edge: f64,
+        area: &CellBox,
+        later: bool,
+        pauses: &Pauses,
+    ) -> CellBox {
         let side = 2 * (TILE * edge / 2.0).ceil() as u32;
         let before = side / 2 * pass as u32;
         let mut index = vec![NONE; nets.cells.slots().len()];
@@ -145,6 +156,7 @@ impl Coarsening {
                     for slot in nets.cells.within(&area) {
                         self.passes[pass].set(slot, slot, Vec3::ZERO);
                     }
+                    pauses.after(TILE_WORK).await;
                     if later {
                         continue;
                     }
@@ -188,14 +200,21 @@ impl Nets {
     /// Coarsens the surfaces around a box of cells that have changed, and where that was put off before, to edges of about
     /// `edge` voxels; or puts that off until `later`, with no cells merged there. Sets the flag, by number, of each label
     /// whose triangles have changed by that.
-    pub fn coarsen(&mut self, edge: f64, area: &CellBox, later: bool, reconnected: &mut [bool]) {
+    pub async fn coarsen(
+        &mut self,
+        edge: f64,
+        area: &CellBox,
+        later: bool,
+        reconnected: &mut [bool],
+        pauses: &Pauses,
+    ) {
         let mut coarse = std::mem::take(&mut self.coarse);
         if edge > 1.0 {
             let area = coarse.pending.map_or(*area, |pending| pending.union(area));
             coarse.pending = later.then_some(area);
             coarse.passes.iter_mut().for_each(|pass| pass.resize(self.cells.slots().len()));
-            let first = coarse.run_pass(0, self, edge, &area.grown(1, self.grid.dims()), later);
-            coarse.run_pass(1, self, edge, &first, later);
+            let first = coarse.run_pass(0, self, edge, &area.grown(1, self.grid.dims()), later, pauses).await;
+            coarse.run_pass(1, self, edge, &first, later, pauses).await;
             coarse.finish(self, reconnected);
             self.coarse = coarse;
         } else {

@@ -7,6 +7,10 @@ use super::cells::{BLOCK_SIDE, Cell, CellBox, Cells};
 use super::cube_loops::{cube_loops, edges_across, face};
 use super::label_grid::BACKGROUND;
 use crate::mesh::DisjointSets;
+use crate::methods::slices::Pauses;
+
+/// Work that a block counts as.
+const BLOCK_WORK: usize = 50;
 
 /// The components of all surfaces together.
 #[derive(Clone, Debug, Default)]
@@ -34,8 +38,9 @@ impl Components {
     }
 
     /// Follows changes of the cells in a box.
-    pub fn update(&mut self, cells: &Cells, area: &CellBox) {
+    pub async fn update(&mut self, cells: &Cells, area: &CellBox, pauses: &Pauses) {
         for (index, at) in cells.blocks_within(area) {
+            pauses.after(BLOCK_WORK).await;
             if index >= self.blocks.len() {
                 self.blocks.resize_with(index + 1, BlockComponents::default);
             }

@@ -3,6 +3,7 @@
 use super::cells::CellBox;
 use super::label_grid::BACKGROUND;
 use super::nets::{NetVertex, Nets};
+use crate::methods::slices::Pauses;
 use std::collections::BTreeSet;
 
 /// The numbers of vertices and triangles of all surfaces together, or of a part of them.
@@ -41,9 +42,10 @@ impl Counts {
 impl Nets {
     /// Counts the vertices in and the polygons that begin at the cells of a box: calls `add` with parts of the counts of
     /// each label, by number.
-    pub fn count(&self, area: &CellBox, mut add: impl FnMut(u16, Counts)) {
+    pub async fn count(&self, area: &CellBox, pauses: &Pauses, mut add: impl FnMut(u16, Counts)) {
         let mut on_faces = BTreeSet::new();
         for slot in self.cells.within(area) {
+            pauses.after(1).await;
             let cell = self.cells.get(slot);
             cell.numbers()
                 .for_each(|number| add(number, Counts { vertices: cell.vertices_of(number), triangles: 0 }));

@@ -142,9 +142,8 @@ impl LabelSurfaces {
 
     async fn create(grid: LabelGrid, to_world: DAffine3, params: LabelParams) -> Result<Self, MethodError> {
         let pauses = Pauses::default();
-        let nets = Nets::new(grid, to_world)?;
+        let nets = Nets::new(grid, to_world, &pauses).await?;
         let everywhere = nets.everywhere();
-        pauses.after(nets.cells.slots().len()).await;
         let mut surfaces = Self {
             counts: Counts::default(),
             label_counts: Vec::new(),
@@ -160,12 +159,12 @@ impl LabelSurfaces {
             clock: || 0.0,
         };
         let cells = surfaces.nets.cells.slots().len();
-        surfaces.recount();
+        surfaces.recount(&pauses).await;
         pauses.after(cells).await;
         surfaces.nets.untangle(everywhere, &pauses).await;
         surfaces.wake(everywhere);
         pauses.after(cells).await;
-        surfaces.coarsen(everywhere, &[], &mut []);
+        surfaces.coarsen(everywhere, &[], &mut [], &pauses).await;
         Ok(surfaces)
     }
 
@@ -233,21 +232,22 @@ impl LabelSurfaces {
         };
         let touched = changed.grown(1, dims);
         let mut old = self.nets.grid.read(volume, region)?;
-        self.count(&touched, Counts::remove);
+        let pauses = Pauses::default();
+        finished(self.count(&touched, Counts::remove, &pauses));
         let updated = self.nets.update(changed);
         if updated.is_err() {
             // The cells as they were need no memory that they did not have.
             self.nets.grid.replace(region, &mut old);
             self.nets.update(changed)?;
         }
-        self.count(&touched, Counts::add);
-        self.components.update(&self.nets.cells, &changed);
-        let untangle = async |nets: &mut Nets| nets.untangle(touched, &Pauses::default()).await;
+        finished(self.count(&touched, Counts::add, &pauses));
+        finished(self.components.update(&self.nets.cells, &changed, &pauses));
+        let untangle = async |nets: &mut Nets| nets.untangle(touched, &pauses).await;
         let untangled = if updated.is_ok() { finished(untangle(&mut self.nets)) } else { Vec::new() };
         let area = changed.grown(HALO, dims);
         self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
         let mut reconnected = updated.as_ref().map_or_else(|_| self.nets.no_labels(), Clone::clone);
-        self.coarsen(touched, &untangled, &mut reconnected);
+        finished(self.coarsen(touched, &untangled, &mut reconnected, &pauses));
         updated?;
         self.nets.flag_labels_in(untangled, &mut reconnected);
         self.versions.record(&[], &reconnected);
@@ -256,32 +256,33 @@ impl LabelSurfaces {
 
     /// Coarsens the surfaces around a box, and cells in slots, that have changed, or prepares that while surfaces are yet to
     /// be smoothed; sets the flag, by number, of each label whose triangles have changed by that.
-    fn coarsen(&mut self, area: CellBox, slots: &[u32], reconnected: &mut [bool]) {
+    async fn coarsen(&mut self, area: CellBox, slots: &[u32], reconnected: &mut [bool], pauses: &Pauses) {
         let cells = slots.iter().map(|&slot| self.nets.cells.get(slot).at);
         let area = cells.fold(area, |area, at| area.union(&CellBox { low: at, high: at }));
-        self.nets.coarsen(self.params.edge, &area, self.zone.is_some(), reconnected);
+        self.nets.coarsen(self.params.edge, &area, self.zone.is_some(), reconnected, pauses).await;
     }
 
     /// Counts again from the beginning, when labels may have other numbers, and cells other places.
-    fn recount(&mut self) {
+    async fn recount(&mut self, pauses: &Pauses) {
         let everywhere = self.nets.everywhere();
         self.counts = Counts::default();
         self.label_counts.clear();
-        self.count(&everywhere, Counts::add);
+        self.count(&everywhere, Counts::add, pauses).await;
         self.components = Components::default();
-        self.components.update(&self.nets.cells, &everywhere);
+        self.components.update(&self.nets.cells, &everywhere, pauses).await;
     }
 
     /// Adds the counts of the part in a box to those of its labels and of all, or removes them.
-    fn count(&mut self, area: &CellBox, change: fn(&mut Counts, Counts)) {
+    async fn count(&mut self, area: &CellBox, change: fn(&mut Counts, Counts), pauses: &Pauses) {
         let labels = self.nets.grid.values().len();
         if self.label_counts.len() < labels {
             self.label_counts.resize(labels, Counts::default());
         }
-        self.nets.count(area, |number, part| {
+        let add = |number, part| {
             change(&mut self.counts, part);
             change(&mut self.label_counts[usize::from(number) - 1], part);
-        });
+        };
+        self.nets.count(area, pauses, add).await;
     }
 
     /// Returns the current parameters.
@@ -301,7 +302,8 @@ impl LabelSurfaces {
         }
         if self.params.edge != before.edge {
             let mut reconnected = self.nets.no_labels();
-            self.coarsen(self.nets.everywhere(), &[], &mut reconnected);
+            let everywhere = self.nets.everywhere();
+            finished(self.coarsen(everywhere, &[], &mut reconnected, &Pauses::default()));
             self.versions.record(&[], &reconnected);
             if self.zone.is_none() {
                 self.measure_all();
@@ -370,7 +372,7 @@ impl LabelSurfaces {
             pauses.after(zone.moving()).await;
             let seen = if is_last { zone.numbers() } else { Vec::new() };
             self.zone = (!is_last).then_some(zone);
-            self.coarsen(area, &untangled, &mut reconnected);
+            self.coarsen(area, &untangled, &mut reconnected, &pauses).await;
             let start = self.note("coarsening", &mut times, start);
             pauses.after(self.nets.cells.slots().len()).await;
             if is_last {

@@ -15,7 +15,15 @@ use super::label_grid::{BACKGROUND, LabelGrid};
 use crate::math::order::sort_distinct;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::mesh::grid_origin;
+use crate::methods::MethodError;
+use crate::methods::slices::Pauses;
 use crate::volume::VolumeError;
+
+/// Largest number of cells through which surfaces pass; more would take more than a gigabyte. Labels of noise have as many
+/// in 200³ voxels, those of anatomy in 1000³.
+const MOST_CELLS: usize = 8_000_000;
+/// Work that a layer of voxels counts as, whatever is in it.
+const LAYER_WORK: usize = 50;
 
 /// Width of the gap between surfaces that touch, in voxels.
 pub const GAP: f32 = 0.01;
@@ -104,12 +112,30 @@ impl Nets {
     /// space of the volume to world space.
     ///
     /// # Errors
-    /// [`VolumeError::TooLarge`].
-    pub fn new(grid: LabelGrid, to_world: DAffine3) -> Result<Self, VolumeError> {
+    /// [`VolumeError::TooLarge`]; [`MethodError::InvalidArgument`] for surfaces through more than [`MOST_CELLS`] cells.
+    pub async fn new(grid: LabelGrid, to_world: DAffine3, pauses: &Pauses) -> Result<Self, MethodError> {
         let (cells, coarse, of_labels) = (Cells::new(grid.dims())?, Coarsening::default(), Vec::new());
         let origin = grid_origin(&to_world, grid.dims());
         let mut nets = Self { cells, coarse, of_labels, grid, to_world, origin };
-        nets.update(nets.everywhere())?;
+        let everywhere = nets.everywhere();
+        let mut changed = nets.no_labels();
+        for z in everywhere.low[2]..=everywhere.high[2] {
+            let [mut low, mut high] = [everywhere.low, everywhere.high];
+            (low[2], high[2]) = (z, z);
+            let before = nets.cells.slots().len();
+            nets.cells.update(&nets.grid, CellBox { low, high }, &mut changed)?;
+            let cells = nets.cells.slots().len();
+            if cells > MOST_CELLS {
+                let problem = format!(
+                    "the surfaces of its labels pass through more than {MOST_CELLS} cells of its grid: choose some labels, or \
+                     crop or resample it"
+                );
+                return Err(MethodError::invalid("volume", problem));
+            }
+            pauses.after(cells - before + LAYER_WORK).await;
+        }
+        nets.list(everywhere, &changed);
+        pauses.after(nets.cells.slots().len()).await;
         Ok(nets)
     }
 
@@ -121,6 +147,12 @@ impl Nets {
     pub fn update(&mut self, area: CellBox) -> Result<Vec<bool>, VolumeError> {
         let mut changed = self.no_labels();
         self.cells.update(&self.grid, area, &mut changed)?;
+        self.list(area, &changed);
+        Ok(changed)
+    }
+
+    /// Lists the cells in which labels are that have `changed` in a box.
+    fn list(&mut self, area: CellBox, changed: &[bool]) {
         self.of_labels.resize(changed.len() - 1, Vec::new());
         for slot in self.cells.within(&area) {
             for number in self.cells.get(slot).numbers().filter(|&number| changed[usize::from(number)]) {
@@ -134,7 +166,6 @@ impl Nets {
             slots.retain(|&slot| cells.get(slot).corners.contains(&number));
             sort_distinct(slots);
         }
-        Ok(changed)
     }
 
     /// Replaces labels and cells.

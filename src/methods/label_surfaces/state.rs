@@ -6,6 +6,7 @@ use super::label_grid::LabelGrid;
 use super::{CellBox, LabelParams, LabelSurfaces};
 use crate::math::Vec3;
 use crate::methods::saved::{Hash, Magic, decode, encode};
+use crate::methods::slices::{Pauses, finished};
 use crate::methods::{MethodError, Parameters};
 use serde::{Deserialize, Serialize};
 
@@ -75,15 +76,16 @@ impl LabelSurfaces {
         };
         let Some(cells) = self.restored(&grid, &state)? else { return bad("cells", "inconsistent") };
         self.nets.restore(grid, cells);
-        self.recount();
+        let pauses = Pauses::default();
+        finished(self.recount(&pauses));
         self.params = state.params;
         self.zone = None;
-        self.coarsen(self.nets.everywhere(), &[], &mut []);
+        finished(self.coarsen(self.nets.everywhere(), &[], &mut [], &pauses));
         if let Some([low, high]) = state.area {
             self.wake(CellBox { low, high });
         }
         if let Some([low, high]) = state.pending {
-            self.coarsen(CellBox { low, high }, &[], &mut []);
+            finished(self.coarsen(CellBox { low, high }, &[], &mut [], &pauses));
         }
         (self.iterations, self.steps, self.residual) = (state.iterations, state.steps, state.residual);
         self.off.clear();

@@ -404,9 +404,9 @@ fn assert_coarse_anew(surfaces: &LabelSurfaces, what: &str) {
     let mut anew = surfaces.nets.clone();
     anew.coarse = super::coarsen::Coarsening::default();
     let edge = surfaces.params.edge;
-    anew.coarsen(edge, &anew.everywhere(), false, &mut []);
+    finished(anew.coarsen(edge, &anew.everywhere(), false, &mut [], &Pauses::default()));
     if let Some(pending) = surfaces.nets.coarse.pending {
-        anew.coarsen(edge, &pending, true, &mut []);
+        finished(anew.coarsen(edge, &pending, true, &mut [], &Pauses::default()));
     }
     for slot in surfaces.nets.cells.within(&anew.everywhere()) {
         let found = [&surfaces.nets, &anew].map(|nets| (nets.coarse.target(slot), nets.coarse.shift(slot)));
@@ -704,6 +704,31 @@ fn coarse_surfaces_follow_strokes_as_if_made_anew() {
     let mut other = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
     other.restore(&state).unwrap();
     assert!(other.surface() == surfaces.surface());
+}
+
+/// Single voxels, each with a surface in all cells around it.
+fn dust(side: usize) -> Volume {
+    let is_grain = |i: usize| [i % side, i / side % side, i / side / side].iter().all(|at| at % 2 == 1);
+    volume([side; 3], (0..side.pow(3)).map(|i| u8::from(is_grain(i))).collect())
+}
+
+#[test]
+fn creation_pauses_in_each_of_its_parts() {
+    let volume = dust(40);
+    let mut creation = Box::pin(LabelSurfaces::begin(&volume, None, LabelParams::default()).unwrap());
+    let mut pauses = 0;
+    while advance(&mut creation).is_pending() {
+        pauses += 1;
+    }
+    // Cells are found, counted, joined to components, and tested for intersections: all of them each time.
+    let cells = 40_usize.pow(3);
+    assert!(pauses > 4 * cells / 500, "{pauses}");
+}
+
+#[test]
+fn surfaces_everywhere_in_a_large_volume_are_refused() {
+    let refusal = LabelSurfaces::new(&dust(205), None, LabelParams::default()).err().unwrap().to_string();
+    assert!(refusal.starts_with("volume: ") && refusal.contains("8000000 cells"), "{refusal}");
 }
 
 #[test]
