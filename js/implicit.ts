@@ -20,9 +20,9 @@ export interface ImplicitParams {
   kernel?: 'multi-order' | 'thin-plate' | 'biharmonic' | 'gaussian';
   /**
    * First-order smoothness of the multi-order kernel, δ, per unit of length of the normalised box (longest side 2):
-   * larger values give a tighter surface.
+   * larger values give a tighter surface. `'auto'` chooses it by the density of the points.
    */
-  delta?: number;
+  delta?: number | 'auto';
   /**
    * Third-order smoothness of the multi-order kernel, τ, a length in the normalised box (longest side 2): larger values
    * give less detail.
@@ -32,14 +32,17 @@ export interface ImplicitParams {
   sigma?: number;
   /**
    * Regularisation λ of surface constraints (points where the implicit function f is to be 0): how much each may be
-   * missed; 0 interpolates. With n > 3,000 points it is multiplied by n/3,000.
+   * missed; 0 interpolates. With n > 3,000 points it is multiplied by n/3,000. `'auto'` chooses it by the density and the
+   * noise of the points.
    */
-  lambdaSurface?: number;
+  lambdaSurface?: number | 'auto';
   /**
    * Regularisation λ of exterior constraints (points where the implicit function f is to be −1): how much each may be
-   * missed.
+   * missed. `'auto'` places constraints on both sides of the surface, 1 inside and −1 outside, instead of outside only, and
+   * chooses it by density and noise; not with cameras, or exterior points that are given. Noise then does not shrink the
+   * surface, and parts that no point supports are left out.
    */
-  lambdaExterior?: number;
+  lambdaExterior?: number | 'auto';
   /** Relative residual at which the iterative solver of the linear system for f stops. */
   tolerance?: number;
   /**
@@ -52,6 +55,20 @@ export interface ImplicitParams {
    * surface constraints.
    */
   level?: 'zero' | 'mean';
+}
+
+/** Measures of points, and the values that an implicit surface chose by them, in units of the normalised box. */
+export interface ImplicitChoice {
+  /** Noise of the points: their standard deviation from the surface along its normal; 0 for fewer than 100 points. */
+  noise: number;
+  /** Number of points on a unit of area. */
+  density: number;
+  /** The value of `lambdaSurface` if that is `'auto'`; not multiplied for many points. */
+  lambdaSurface: number;
+  /** That of `lambdaExterior`. */
+  lambdaExterior: number;
+  /** That of `delta`. */
+  delta: number;
 }
 
 /** A camera from which the points were reconstructed, or with which the mesh is coloured. */
@@ -140,6 +157,7 @@ interface Statistics {
   spacing: number;
   duplicates: number;
   spuriousComponents: number;
+  choice?: ImplicitChoice;
   warning?: string;
 }
 
@@ -207,6 +225,14 @@ export class ImplicitSurface implements Stepper {
    */
   get spacing(): number {
     return this.#statistics().spacing;
+  }
+
+  /**
+   * Measures of the surface constraints, and the values chosen by them for parameters that are `'auto'`; `undefined` until
+   * the constraints are selected.
+   */
+  get choice(): ImplicitChoice | undefined {
+    return this.#statistics().choice;
   }
 
   /** Number of input points left out as duplicates of others. */
@@ -320,12 +346,16 @@ export class ImplicitSurface implements Stepper {
   }
 
   /**
-   * Returns the surface constraints (the points used) and the exterior constraints, packed; empty until they are
-   * chosen. In double precision where the points need it.
+   * Returns the surface constraints (the points used), the exterior constraints and those inside, of which there are only
+   * with `lambdaExterior: 'auto'`, packed; empty until they are chosen. In double precision where the points need it.
    */
-  constraints(): { surface: PointArray; exterior: PointArray } {
-    const [surface, exterior] = this.#handle.use((raw) => [raw.constraints(0), raw.constraints(1)]);
-    return { surface: surface as PointArray, exterior: exterior as PointArray };
+  constraints(): { surface: PointArray; exterior: PointArray; interior: PointArray } {
+    const [surface, exterior, interior] = this.#handle.use((raw) => [0, 1, 2].map((kind) => raw.constraints(kind)));
+    return {
+      surface: surface as PointArray,
+      exterior: exterior as PointArray,
+      interior: interior as PointArray,
+    };
   }
 
   /**

@@ -20,7 +20,10 @@ export interface ParamSpec {
   /** How values of the parameter are spread over a slider. */
   scale?: 'linear' | 'log';
   unit?: string;
-  /** Accepted words for a parameter of type 'choice'; if `min` is set, numbers are accepted, too. */
+  /**
+   * Accepted words for a parameter of type 'choice'; if `min` is set, numbers are accepted, too. Of one of type 'number',
+   * words that are accepted instead of a number.
+   */
   choices?: string[];
 }
 

@@ -10,6 +10,8 @@ export type WarningCode =
   | 'small-object'
   /** A label so thin that the volume of its surface is not that of its voxels. */
   | 'thin-label'
+  /** Parts or gaps so thin that the points hardly tell them apart: topology and volume may be wrong. */
+  | 'thin-parts'
   /** Positions or intensities that had to be rounded more than the result should suffer. */
   | 'precision'
   /** A surface that was moved towards the origin, since where it is it could not be represented. */

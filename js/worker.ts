@@ -65,6 +65,7 @@ export type {
   ErrorCode,
   Fitness,
   FrameStatistics,
+  ImplicitChoice,
   ImplicitOptions,
   ImplicitParams,
   InitInput,

@@ -75,6 +75,9 @@ codes! {
     SmallObject = "small-object",
     /// A label is so thin that the volume of its surface is not that of its voxels.
     ThinLabel = "thin-label",
+    /// Parts of the surface, or gaps between them, are so thin that the points hardly tell them apart: topology and volume
+    /// may be wrong.
+    ThinParts = "thin-parts",
     /// Positions or intensities are rounded more than the result should suffer.
     Precision = "precision",
     /// The surface was moved towards the origin, since where it is it could not be represented.

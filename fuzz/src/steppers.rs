@@ -14,7 +14,7 @@ use vesicle::methods::multires::{
     ControlEllipsoid, Energy, MultiresOptions, MultiresParams, MultiresolutionModel, Topology,
 };
 use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
-use vesicle::methods::{MethodError, deformable};
+use vesicle::methods::{Auto, MethodError, deformable};
 use vesicle::volume::{Volume, VolumeInit, Voxels};
 
 /// Asserts that a mesh is closed, oriented and manifold, has the predicted Euler characteristic, and has no
@@ -262,11 +262,24 @@ fn implicit_options(bytes: &mut Choices, size: f64) -> ImplicitOptions {
 /// Returns random parameters with coarse cells, so that a run takes milliseconds.
 fn implicit_params(bytes: &mut Choices, size: f64) -> ImplicitParams {
     ImplicitParams {
-        delta: bytes.one_of(&[0.1, 1.0, 5.0, 20.0, 100.0]),
+        delta: bytes.one_of(&[
+            Auto::Given(0.1),
+            Auto::Given(1.0),
+            Auto::Given(5.0),
+            Auto::Given(20.0),
+            Auto::Given(100.0),
+            Auto::Auto,
+        ]),
         tau: bytes.one_of(&[0.001, 0.01, 0.025, 0.1, 1.0]),
         sigma: bytes.one_of(&[0.005, 0.07, 0.3, 1.0]),
-        lambda_surface: bytes.one_of(&[0.0, 0.001, 0.01, 10.0]),
-        lambda_exterior: bytes.one_of(&[0.0, 2.0, 1000.0]),
+        lambda_surface: bytes.one_of(&[
+            Auto::Given(0.0),
+            Auto::Given(0.001),
+            Auto::Given(0.01),
+            Auto::Given(10.0),
+            Auto::Auto,
+        ]),
+        lambda_exterior: bytes.one_of(&[Auto::Given(0.0), Auto::Given(2.0), Auto::Given(1000.0), Auto::Auto]),
         tolerance: bytes.one_of(&[1e-2, 1e-5, 1e-8, 1e-12]),
         cell: if bytes.chance(16) { 0.0 } else { size * bytes.within(0.1, 0.4) },
         level: bytes.one_of(&[IsoValue::Zero, IsoValue::Mean]),

@@ -14,7 +14,7 @@ use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
 use vesicle::math::Vec3;
 use vesicle::methods::implicit::{
-    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits,
+    Camera, Choice, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits,
 };
 
 /// The raw handle of a list of cameras, whose images colour an implicit surface.
@@ -145,11 +145,10 @@ impl RawImplicit {
         Ok(gradients.into_iter().flat_map(|g| g.as_vec3().to_array()).collect())
     }
 
-    /// Returns the positions of the constraints of the implicit function: the surface constraints (`which` 0) or the
-    /// exterior constraints (1), as packed xyz in world space.
+    /// Returns the positions of the constraints of the implicit function: the surface constraints (`which` 0), the
+    /// exterior constraints (1) or those inside (2), as packed xyz in world space.
     pub fn constraints(&self, which: usize) -> JsValue {
-        let [surface, exterior] = self.0.borrow().constraints();
-        self.in_world(if which == 0 { &surface } else { &exterior })
+        self.0.borrow().constraints().get(which).map_or(JsValue::UNDEFINED, |some| self.in_world(some))
     }
 
     /// Returns how well the surface fits the input points, as edited manually, as a `Fitness` object: their distances
@@ -175,8 +174,8 @@ impl RawImplicit {
     }
 
     /// Returns further results: the edge of an extraction cell in world units, the mean spacing of the surface
-    /// constraints in units of the normalised box, the numbers of duplicate points and of spurious components, and a
-    /// warning about the parameters if there is one.
+    /// constraints in units of the normalised box, the numbers of duplicate points and of spurious components, what
+    /// was chosen from the points, and a warning about the parameters if there is one.
     pub fn statistics(&self) -> Result<JsValue, JsValue> {
         let surface = self.0.borrow();
         Ok(to_js(&Statistics {
@@ -184,6 +183,7 @@ impl RawImplicit {
             spacing: surface.spacing(),
             duplicates: surface.duplicates(),
             spurious_components: surface.spurious_components(),
+            choice: surface.choice().copied(),
             warning: surface.params().warning(),
         })?)
     }
@@ -206,6 +206,8 @@ struct Statistics {
     spacing: f64,
     duplicates: usize,
     spurious_components: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    choice: Option<Choice>,
     #[serde(skip_serializing_if = "Option::is_none")]
     warning: Option<&'static str>,
 }

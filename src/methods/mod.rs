@@ -16,6 +16,6 @@ pub mod tracking;
 
 pub use error::MethodError;
 pub use method::{LiveSurface, Method};
-pub use params::{ParamInput, Parameters};
+pub use params::{Auto, ParamInput, Parameters};
 pub use spec::{ParamDefault, ParamKind, ParamScale, ParamSpec};
 pub use step::{StepReport, Times};

@@ -3,8 +3,8 @@
 //! From the declaration come the struct, its default, the descriptions for user interfaces and the check of ranges.
 
 use super::{MethodError, ParamDefault, ParamKind, ParamSpec};
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// The parameters of a method. Implemented by the macro that declares them.
 pub trait Parameters: Clone + Default + PartialEq + Serialize + DeserializeOwned {
@@ -117,6 +117,85 @@ impl ParamType for bool {
 
     fn as_default(&self) -> ParamDefault {
         ParamDefault::Boolean(*self)
+    }
+}
+
+/// A number, or the word `auto`: the method then chooses it from its data.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Auto {
+    /// Chosen by the method.
+    Auto,
+    /// Given by the caller.
+    Given(f64),
+}
+
+impl Auto {
+    /// Returns the number if it is given.
+    pub fn given(self) -> Option<f64> {
+        if let Self::Given(number) = self { Some(number) } else { None }
+    }
+}
+
+impl From<f64> for Auto {
+    fn from(number: f64) -> Self {
+        Self::Given(number)
+    }
+}
+
+choices! {
+    enum AutoWord {
+        Auto = "auto",
+    }
+}
+
+impl ParamType for Auto {
+    const KIND: ParamKind = ParamKind::Number;
+
+    const CHOICES: Option<&'static [&'static str]> = AutoWord::CHOICES;
+
+    fn from_input(value: &ParamInput) -> Option<Self> {
+        match AutoWord::from_input(value) {
+            Some(AutoWord::Auto) => Some(Self::Auto),
+            None => f64::from_input(value).map(Self::Given),
+        }
+    }
+
+    fn as_default(&self) -> ParamDefault {
+        self.given().map_or_else(|| AutoWord::Auto.as_default(), |number| number.as_default())
+    }
+
+    fn number(&self) -> Option<f64> {
+        self.given()
+    }
+}
+
+/// The form in which an [`Auto`] is serialised in human-readable formats. Binary states store a number, NaN for `auto`.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum AutoInWords {
+    Word(AutoWord),
+    Number(f64),
+}
+
+impl Serialize for Auto {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if !serializer.is_human_readable() {
+            return self.given().unwrap_or(f64::NAN).serialize(serializer);
+        }
+        self.given().map_or(AutoInWords::Word(AutoWord::Auto), AutoInWords::Number).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Auto {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        if !deserializer.is_human_readable() {
+            let number = f64::deserialize(deserializer)?;
+            return Ok(if number.is_nan() { Self::Auto } else { Self::Given(number) });
+        }
+        Ok(match AutoInWords::deserialize(deserializer)? {
+            AutoInWords::Word(AutoWord::Auto) => Self::Auto,
+            AutoInWords::Number(number) => Self::Given(number),
+        })
     }
 }
 

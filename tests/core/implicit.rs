@@ -8,7 +8,7 @@ use vesicle::mesh::{TriangleMesh, curvature, measure, report};
 use vesicle::methods::implicit::{
     Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits,
 };
-use vesicle::methods::{MethodError, Parameters, StepReport};
+use vesicle::methods::{Auto, MethodError, Parameters, StepReport};
 use vesicle::volume::marching_cubes_world;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -154,7 +154,8 @@ fn twenty_thousand_noisy_points_of_a_torus() {
 #[test]
 fn without_regularization_the_surface_passes_through_the_points() {
     let points = noisy(blend, 800, 0.0, 3);
-    let params = ImplicitParams { lambda_surface: 0.0, tolerance: 1e-8, ..ImplicitParams::default() };
+    let params =
+        ImplicitParams { lambda_surface: Auto::Given(0.0), tolerance: 1e-8, ..ImplicitParams::default() };
     let surface = finished(points.clone(), params);
     let values = surface.evaluate(&points).unwrap();
     let most = values.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
@@ -175,7 +176,11 @@ fn more_regularization_smooths_noisy_points() {
     let mut curvatures = Vec::new();
     for lambda_surface in [0.0, 0.001, 0.01, 0.1] {
         surface
-            .set_params(ImplicitParams { lambda_surface, level: IsoValue::Mean, ..ImplicitParams::default() })
+            .set_params(ImplicitParams {
+                lambda_surface: lambda_surface.into(),
+                level: IsoValue::Mean,
+                ..ImplicitParams::default()
+            })
             .unwrap();
         finish(&mut surface);
         sound(surface.surface());
@@ -218,9 +223,14 @@ fn the_mean_level_passes_nearer_to_the_points() {
 fn changed_parameters_give_the_result_of_a_new_surface() {
     let points = noisy(torus, 500, 0.005, 2);
     let changes = [
-        ImplicitParams { delta: 10.0, tau: 0.01, ..ImplicitParams::default() },
-        ImplicitParams { delta: 10.0, tau: 0.01, cell: 0.03, ..ImplicitParams::default() },
-        ImplicitParams { lambda_surface: 0.0, lambda_exterior: 0.5, cell: 0.03, ..ImplicitParams::default() },
+        ImplicitParams { delta: Auto::Given(10.0), tau: 0.01, ..ImplicitParams::default() },
+        ImplicitParams { delta: Auto::Given(10.0), tau: 0.01, cell: 0.03, ..ImplicitParams::default() },
+        ImplicitParams {
+            lambda_surface: Auto::Given(0.0),
+            lambda_exterior: Auto::Given(0.5),
+            cell: 0.03,
+            ..ImplicitParams::default()
+        },
         ImplicitParams { kernel: KernelKind::ThinPlate, level: IsoValue::Mean, ..ImplicitParams::default() },
         ImplicitParams { kernel: KernelKind::Biharmonic, tolerance: 1e-8, ..ImplicitParams::default() },
         ImplicitParams { kernel: KernelKind::Gaussian, sigma: 0.2, ..ImplicitParams::default() },
@@ -231,7 +241,7 @@ fn changed_parameters_give_the_result_of_a_new_surface() {
         assert_eq!(*surface.params(), params);
         // Also when they change again during the run.
         (0..3 * k).for_each(|_| drop(surface.step().unwrap()));
-        let other = ImplicitParams { delta: 7.0, ..params.clone() };
+        let other = ImplicitParams { delta: Auto::Given(7.0), ..params.clone() };
         surface.set_params(other).unwrap();
         (0..k).for_each(|_| drop(surface.step().unwrap()));
         surface.set_params(params.clone()).unwrap();
@@ -260,7 +270,9 @@ fn only_phases_that_depend_on_a_changed_parameter_run_again() {
         surface.set_params(change).unwrap();
         assert_eq!(surface.step().unwrap().iteration, report.iteration, "nothing to do");
     }
-    surface.set_params(ImplicitParams { lambda_surface: 0.002, ..ImplicitParams::default() }).unwrap();
+    surface
+        .set_params(ImplicitParams { lambda_surface: Auto::Given(0.002), ..ImplicitParams::default() })
+        .unwrap();
     assert_eq!(surface.step().unwrap().phase, "solve");
 }
 
@@ -273,7 +285,7 @@ fn a_failure_keeps_the_surface_and_other_parameters_continue() {
     for (name, wrong) in [
         ("cell", ImplicitParams { cell: 1e-9, ..params.clone() }),
         ("cell", ImplicitParams { cell: 1e-29, ..params.clone() }),
-        ("delta", ImplicitParams { delta: 0.0, ..params.clone() }),
+        ("delta", ImplicitParams { delta: Auto::Given(0.0), ..params.clone() }),
         ("tau", ImplicitParams { tau: f64::NAN, cell: 0.1, ..params.clone() }),
     ] {
         assert_eq!(refused(surface.set_params(wrong)), name);
@@ -282,7 +294,7 @@ fn a_failure_keeps_the_surface_and_other_parameters_continue() {
         assert!(*surface.surface() == before);
     }
     // Detected only when the extraction begins.
-    surface.set_params(ImplicitParams { cell: 1e-9, delta: 6.0, ..params.clone() }).unwrap();
+    surface.set_params(ImplicitParams { cell: 1e-9, delta: Auto::Given(6.0), ..params.clone() }).unwrap();
     let failed = (0..10_000).find_map(|_| surface.step().err());
     assert!(matches!(failed, Some(MethodError::InvalidArgument { parameter: "cell", .. })), "{failed:?}");
     assert!(*surface.surface() == before);
@@ -300,8 +312,8 @@ fn an_unsolvable_system_is_reported() {
     let wide = ImplicitParams {
         kernel: KernelKind::Gaussian,
         sigma: 1.0,
-        lambda_surface: 0.0,
-        lambda_exterior: 0.0,
+        lambda_surface: Auto::Given(0.0),
+        lambda_exterior: Auto::Given(0.0),
         tolerance: 1e-12,
         ..ImplicitParams::default()
     };
@@ -359,7 +371,7 @@ fn a_restored_run_continues_bit_for_bit() {
         assert!(phases.iter().any(|found| found == phase), "{phase} of {phases:?}");
     }
     // While another solution is computed the last surface is kept, and restored as well.
-    whole.set_params(ImplicitParams { delta: 8.0, ..ImplicitParams::default() }).unwrap();
+    whole.set_params(ImplicitParams { delta: Auto::Given(8.0), ..ImplicitParams::default() }).unwrap();
     (0..3).for_each(|_| drop(whole.step().unwrap()));
     let mut resumed = begun();
     resumed.restore(&whole.save()).unwrap();
@@ -776,16 +788,16 @@ fn invalid_points_and_options_are_refused_by_name() {
 fn invalid_parameters_are_refused_by_name() {
     let usual = ImplicitParams::default;
     let all = [
-        ("delta", ImplicitParams { delta: 0.0, ..usual() }),
-        ("delta", ImplicitParams { delta: -5.0, ..usual() }),
-        ("delta", ImplicitParams { delta: f64::INFINITY, ..usual() }),
+        ("delta", ImplicitParams { delta: Auto::Given(0.0), ..usual() }),
+        ("delta", ImplicitParams { delta: Auto::Given(-5.0), ..usual() }),
+        ("delta", ImplicitParams { delta: Auto::Given(f64::INFINITY), ..usual() }),
         ("tau", ImplicitParams { tau: 0.0, ..usual() }),
         ("tau", ImplicitParams { tau: -0.025, ..usual() }),
         ("tau", ImplicitParams { tau: f64::NAN, ..usual() }),
         ("sigma", ImplicitParams { sigma: 0.0, ..usual() }),
-        ("lambdaSurface", ImplicitParams { lambda_surface: -1e-9, ..usual() }),
-        ("lambdaSurface", ImplicitParams { lambda_surface: f64::NAN, ..usual() }),
-        ("lambdaExterior", ImplicitParams { lambda_exterior: -2.0, ..usual() }),
+        ("lambdaSurface", ImplicitParams { lambda_surface: Auto::Given(-1e-9), ..usual() }),
+        ("lambdaSurface", ImplicitParams { lambda_surface: Auto::Given(f64::NAN), ..usual() }),
+        ("lambdaExterior", ImplicitParams { lambda_exterior: Auto::Given(-2.0), ..usual() }),
         ("tolerance", ImplicitParams { tolerance: 0.0, ..usual() }),
         ("tolerance", ImplicitParams { tolerance: 0.5, ..usual() }),
         ("cell", ImplicitParams { cell: -0.1, ..usual() }),
@@ -801,9 +813,15 @@ fn invalid_parameters_are_refused_by_name() {
     }
     assert_eq!(ImplicitParams::specs().len(), 9);
     for delta in [24.9, 25.0, 40.0] {
-        assert_eq!(ImplicitParams { delta, ..usual() }.warning().is_some(), delta >= 25.0);
+        assert_eq!(
+            ImplicitParams { delta: Auto::Given(delta), ..usual() }.warning().is_some(),
+            delta >= 25.0
+        );
     }
-    assert_eq!(ImplicitParams { delta: 40.0, kernel: KernelKind::Gaussian, ..usual() }.warning(), None);
+    assert_eq!(
+        ImplicitParams { delta: Auto::Given(40.0), kernel: KernelKind::Gaussian, ..usual() }.warning(),
+        None
+    );
 }
 
 #[test]

@@ -17,6 +17,7 @@ use super::common::{Random, euler_of_parts};
 use std::fmt::Write;
 use std::path::Path;
 use vesicle::mesh::{TriangleMesh, report};
+use vesicle::methods::Auto;
 use vesicle::methods::implicit::{Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue};
 
 const POINTS: usize = 3000;
@@ -57,9 +58,9 @@ const ALL: [Known; 4] = [
 /// default, which is finer, the errors without noise are up to a third less, and those with noise the same.
 fn usual() -> ImplicitParams {
     ImplicitParams {
-        delta: 2.0,
+        delta: Auto::Given(2.0),
         tau: 0.1,
-        lambda_surface: 0.0015,
+        lambda_surface: Auto::Given(0.0015),
         level: IsoValue::Mean,
         cell: 0.02,
         ..ImplicitParams::default()
@@ -69,7 +70,7 @@ fn usual() -> ImplicitParams {
 /// Returns the setting for noise of 0.02, for which the one above gives the pair a third component. Without noise this
 /// one rounds off the blend.
 fn smoother() -> ImplicitParams {
-    ImplicitParams { tau: 0.2, lambda_surface: 0.003, cell: 0.03, ..usual() }
+    ImplicitParams { tau: 0.2, lambda_surface: Auto::Given(0.003), cell: 0.03, ..usual() }
 }
 
 /// Asserts the topology of a surface reconstructed from points of a known shape, and returns its mean error.

@@ -6,10 +6,10 @@ use super::common::points::{direction, normal};
 use super::common::{Named, Random, assert_at_least, seeds};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{measure, report};
-use vesicle::methods::MethodError;
 use vesicle::methods::implicit::{
     Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits,
 };
+use vesicle::methods::{Auto, MethodError};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -95,13 +95,14 @@ fn camera(random: &mut Random) -> Camera {
 
 fn params(random: &mut Random) -> ImplicitParams {
     let mut one_of = |values: &[f64]| values[random.below(values.len())];
+    let auto = |number: f64| if number.is_nan() { Auto::Auto } else { Auto::Given(number) };
     let usual = ImplicitParams::default();
     ImplicitParams {
-        delta: one_of(&[0.1, 1.0, 5.0, 5.0, 5.0, 20.0, 40.0, 100.0]),
+        delta: auto(one_of(&[0.1, 1.0, 5.0, 5.0, 5.0, 20.0, 40.0, 100.0, f64::NAN])),
         tau: one_of(&[0.001, 0.01, 0.025, 0.025, 0.1, 1.0]),
         sigma: one_of(&[0.005, 0.07, 0.07, 0.3, 1.0]),
-        lambda_surface: one_of(&[0.0, 0.0, 0.001, 0.001, 0.01, 10.0]),
-        lambda_exterior: one_of(&[0.0, 2.0, 2.0, 1000.0]),
+        lambda_surface: auto(one_of(&[0.0, 0.0, 0.001, 0.001, 0.01, 10.0, f64::NAN])),
+        lambda_exterior: auto(one_of(&[0.0, 2.0, 2.0, 1000.0, f64::NAN])),
         tolerance: one_of(&[1e-2, 1e-5, 1e-5, 1e-8, 1e-12]),
         cell: 0.0,
         level: if random.below(4) == 0 { IsoValue::Mean } else { IsoValue::Zero },
@@ -224,7 +225,7 @@ fn run(seed: u64, tally: &mut Tally) {
 /// Returns random edits: points added near others or, seldom, too far away, and some of the first removed, seldom with
 /// an index that is out of range; or no edits.
 fn edits(surface: &ImplicitSurface, count: usize, random: &mut Random) -> PointEdits {
-    let [known, _] = surface.constraints();
+    let [known, _, _] = surface.constraints();
     let size = known.iter().map(|p| p.as_dvec3().distance(known[0].as_dvec3())).fold(0.0, f64::max);
     let mut places = |most: usize| -> Vec<Vec3> {
         let reach = size * [0.0, 1e-6, 0.01, 0.1, 0.3, 9.0][random.below(6)];

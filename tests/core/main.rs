@@ -28,6 +28,7 @@ mod implicit;
 // Takes minutes in wasm.
 #[cfg(not(target_arch = "wasm32"))]
 mod implicit_accuracy;
+mod implicit_automatic;
 mod implicit_fuzz;
 mod large_volumes;
 mod merge_and_split;

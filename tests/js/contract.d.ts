@@ -369,11 +369,11 @@ export interface Camera {
 export function parsePoints(bytes: Uint8Array): { points: PointArray; normals?: Float32Array; colors?: Float32Array };
 export interface ImplicitParams {
   kernel?: 'multi-order' | 'thin-plate' | 'biharmonic' | 'gaussian';
-  delta?: number; // δ first-order smoothness, in the 2x2x2 box
+  delta?: number | 'auto'; // δ first-order smoothness, in the 2x2x2 box
   tau?: number; // τ third-order smoothness
   sigma?: number; // gaussian width
-  lambdaSurface?: number;
-  lambdaExterior?: number;
+  lambdaSurface?: number | 'auto';
+  lambdaExterior?: number | 'auto';
   tolerance?: number; // relative residual of the solve
   cell?: number; // edge of an extraction cell, in points' units; default from the sampling
   level?: 'zero' | 'mean';

@@ -269,6 +269,26 @@ test('a system without solution is reported, and other parameters continue', () 
   expect(found.step(100_000).done).toBe(true);
 });
 
+test('what is automatic is chosen from the points, and said', async () => {
+  const automatic = { delta: 'auto', lambdaSurface: 'auto', lambdaExterior: 'auto' } as const;
+  const chosen = surface({ params: automatic });
+  expect(chosen.choice).toBeUndefined();
+  expect(chosen.params).toMatchObject(automatic);
+  const { done } = await chosen.run();
+  expect(done).toBe(true);
+  const { noise, density, lambdaSurface, delta } = chosen.choice ?? {};
+  expect(noise).toBeLessThan(0.01);
+  expect([density, lambdaSurface, delta].every((value) => (value ?? 0) > 0)).toBe(true);
+  const { surface: on, exterior, interior } = chosen.constraints();
+  expect(interior.length).toBeGreaterThan(60);
+  expect(chosen.evaluate(interior).every((value) => value > 0)).toBe(true);
+  expect(chosen.evaluate(exterior).every((value) => value < 0)).toBe(true);
+  expect(on.length).toBe(points.length);
+  expect(chosen.mesh.check()).toMatchObject(HEALTHY);
+  expect(() => chosen.setParams({ delta: wrong('some') })).toThrow('delta');
+  chosen.free();
+});
+
 test('an aborted run rejects with the reason and can continue later', async () => {
   const found = surface();
   const [abort, reason] = [new AbortController(), new Error('enough')];

@@ -120,12 +120,11 @@ impl PointEdits {
         surface.check_count()?;
         surface.check_span()?;
         let all_in_box = |all: &[Vec3]| all.iter().map(|&p| map.in_box(p)).collect::<Vec<Vec3>>();
-        let mut outside: Vec<Vec3> =
-            exterior.valid_after_edits(&surface.points, &all_in_box(&self.added)).collect();
+        let [mut outside, inside] = exterior.valid_after_edits(&surface.points, &all_in_box(&self.added));
         outside.extend(all_in_box(&self.exterior));
         outside.extend(&exterior.on_sphere);
         let outside = Cloud { points: outside, ..Cloud::default() }.distinct().points;
-        let constraints = Constraints::new(&surface, &outside);
+        let constraints = Constraints::new(&surface, &outside, &inside);
         match constraints.shared_centre() {
             Some(p) => {
                 let is_added = self.added.iter().any(|&added| map.in_box(added) == p);

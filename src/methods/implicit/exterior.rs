@@ -1,6 +1,7 @@
 //! Exterior points, known to be outside the surface, at which the implicit function f has to be −1: they fix which side
 //! of the input points is outside (Dinh, Turk & Slabaugh, section VI-A).
 
+use super::automatic::Sides;
 use super::camera::Camera;
 use super::cloud::Cloud;
 use super::normals::{Normals, estimated_normals};
@@ -36,6 +37,8 @@ const MIN_CLEARANCE: f32 = 0.8;
 pub struct Exterior {
     /// Exterior points near the surface, given by the caller or made from the surface points.
     pub near: Vec<Vec3>,
+    /// Points inside near the surface, if there are any.
+    pub inside: Vec<Vec3>,
     /// Distance of the points in `near` from the surface points from which they were made, in units of the normalised
     /// box; 0 if the caller gave them.
     pub offset: f32,
@@ -44,20 +47,19 @@ pub struct Exterior {
 }
 
 impl Exterior {
-    /// Returns the exterior points [`Self::near`] that remain valid after edits of the surface points: they are near a
+    /// Returns the points outside, [`Self::near`], and inside that remain valid after edits of the surface points: they are near a
     /// point of `surface`, the edited points, from which they may have been made, and not too near to a point of
     /// `added`. Points given by the caller are all kept.
-    pub fn valid_after_edits<'a>(
-        &'a self,
-        surface: &'a [Vec3],
-        added: &'a [Vec3],
-    ) -> impl Iterator<Item = Vec3> + 'a {
+    pub fn valid_after_edits(&self, surface: &[Vec3], added: &[Vec3]) -> [Vec<Vec3>; 2] {
         let cell = if self.offset > 0.0 { self.offset } else { 1.0 };
         let [surface, added] = [surface, added].map(|points| PointGrid::of(points, cell));
-        self.near.iter().copied().filter(move |&p| {
-            self.offset == 0.0
-                || surface.has_within(p, MAX_OFFSETS * self.offset)
-                    && !added.has_within(p, MIN_CLEARANCE * self.offset)
+        [&self.near, &self.inside].map(|side| {
+            let valid = |p: &&Vec3| {
+                self.offset == 0.0
+                    || surface.has_within(**p, MAX_OFFSETS * self.offset)
+                        && !added.has_within(**p, MIN_CLEARANCE * self.offset)
+            };
+            side.iter().filter(valid).copied().collect()
         })
     }
 }
@@ -69,7 +71,13 @@ const MAX_OFFSETS: f32 = 1.25;
 /// Returns the exterior points `given` by the caller, in units of the normalised box, with points on a sphere around
 /// `cloud`.
 pub fn exterior_from_points(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
-    Exterior { near: given, offset: 0.0, on_sphere: sphere_around(&cloud.points) }
+    Exterior { near: given, inside: Vec::new(), offset: 0.0, on_sphere: sphere_around(&cloud.points) }
+}
+
+/// Returns points on both sides of the surface with points on a sphere around `cloud`.
+pub fn exterior_from_sides(cloud: &Cloud, sides: Sides) -> Exterior {
+    let Sides { outside, inside, offset, .. } = sides;
+    Exterior { near: outside, inside, offset, on_sphere: sphere_around(&cloud.points) }
 }
 
 /// Makes exterior points for the surface points `cloud`, whose mean distance to the nearest neighbour is `spacing`.
@@ -89,7 +97,7 @@ pub fn generate_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: 
         directions.directions.iter().map(|&(i, direction)| cloud.points[i as usize] + direction * offset);
     let outside: Vec<Vec3> = candidates.filter(|&p| !surface.has_within(p, MIN_CLEARANCE * offset)).collect();
     let kept = subsampled(&outside, target_count, seed).into_iter().map(|i| outside[i as usize]);
-    Exterior { near: kept.collect(), offset, on_sphere: sphere_around(&cloud.points) }
+    Exterior { near: kept.collect(), inside: Vec::new(), offset, on_sphere: sphere_around(&cloud.points) }
 }
 
 /// Directions that lead outwards from surface points, for making exterior points, and the noise of the surface points.
@@ -112,7 +120,7 @@ fn outward_directions(
         Some(given) => {
             let at = subsampled(&cloud.points, positions, seed);
             let directions = at.iter().map(|&i| given[i as usize].normalize_or_zero()).collect();
-            (at, Normals { directions, noise: 0.0 })
+            (at, Normals { directions, parts: Vec::new(), noise: 0.0 })
         }
         None => {
             let at = subsampled(&cloud.points, if positions > ORIENTED { positions } else { ORIENTED }, seed);
@@ -292,7 +300,7 @@ mod tests {
             ("both", &known, &cameras),
             ("none", &unknown, &[]),
         ] {
-            let Exterior { near, offset, on_sphere } = generate_exterior(cloud, cameras, spacing, 1);
+            let Exterior { near, offset, on_sphere, .. } = generate_exterior(cloud, cameras, spacing, 1);
             println!(
                 "{name}: {} points, nearest {}",
                 near.len(),
@@ -306,9 +314,9 @@ mod tests {
             let again = generate_exterior(cloud, cameras, spacing, 1);
             assert_eq!((&near, &on_sphere, offset), (&again.near, &again.on_sphere, again.offset));
             // Each is kept with the points it was made from, and dropped if a surface point is added in its position.
-            assert_eq!(again.valid_after_edits(&cloud.points, &[]).count(), near.len());
-            assert_eq!(again.valid_after_edits(&cloud.points, &near[..1]).count(), near.len() - 1);
-            assert_eq!(again.valid_after_edits(&[], &[]).count(), 0);
+            assert_eq!(again.valid_after_edits(&cloud.points, &[])[0].len(), near.len());
+            assert_eq!(again.valid_after_edits(&cloud.points, &near[..1])[0].len(), near.len() - 1);
+            assert_eq!(again.valid_after_edits(&[], &[])[0].len(), 0);
         }
     }
 

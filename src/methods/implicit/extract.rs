@@ -61,8 +61,8 @@ const MAX_DISTANCE_IN_EDGES: f64 = 8100.0;
 
 impl Extraction {
     /// Starts extracting the surface on which `field`, in the normalised box of `map`, equals `level`, from the cells
-    /// around `points` and those that a coarse scan of the lattice finds; `points` and the edge length of a cell,
-    /// `cell`, are in world units.
+    /// around `points` and, if it `scans`, those that a coarse scan of the lattice finds; `points` and the edge length of a
+    /// cell, `cell`, are in world units.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if the cell is too small or too large for the points; [`MethodError::Volume`]
@@ -73,6 +73,7 @@ impl Extraction {
         level: f64,
         points: &[Vec3],
         cell: f64,
+        scans: bool,
     ) -> Result<Self, MethodError> {
         let bounds = Bounds::from_points(points);
         let margin = DVec3::splat(MARGIN * 2.0 / map.scale());
@@ -84,7 +85,9 @@ impl Extraction {
         points.iter().for_each(|p| {
             extractor.seed(p.as_dvec3());
         });
-        extractor.scan(SCAN)?;
+        if scans {
+            extractor.scan(SCAN)?;
+        }
         extractor.refine(STEPS);
         let field = FastField::new(field.clone(), map.in_box_exactly(low), map.in_box_exactly(high));
         Ok(Self { field, map, level, extractor, stage: Stage::Extract })

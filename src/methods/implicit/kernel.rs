@@ -36,12 +36,17 @@ pub enum Kernel {
     },
 }
 
+/// δ where none is given or chosen.
+const USUAL_DELTA: f64 = 5.0;
+
 impl Kernel {
     /// Creates the kernel that `params` select, for constraints whose centres are in a ball of `radius`, in units of
     /// the normalised box.
     pub fn new(params: &ImplicitParams, radius: f64) -> Self {
         match params.kernel {
-            KernelKind::MultiOrder => Self::MultiOrder { delta: params.delta, tau: params.tau },
+            KernelKind::MultiOrder => {
+                Self::MultiOrder { delta: params.delta.given().unwrap_or(USUAL_DELTA), tau: params.tau }
+            }
             KernelKind::ThinPlate => Self::ThinPlate { radius },
             KernelKind::Biharmonic => Self::Biharmonic { radius },
             KernelKind::Gaussian => Self::Gaussian { sigma: params.sigma },

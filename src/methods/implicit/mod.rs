@@ -33,6 +33,7 @@
 //! # Ok::<(), vesicle::methods::MethodError>(())
 //! ```
 
+mod automatic;
 mod camera;
 mod cloud;
 mod color;
@@ -52,6 +53,7 @@ mod sampling;
 mod solve;
 mod state;
 
+pub use automatic::Choice;
 pub use camera::Camera;
 pub use cloud::Cloud;
 pub use edits::PointEdits;
@@ -59,13 +61,16 @@ pub use measure::Fitness;
 pub use params::{ImplicitParams, IsoValue, KernelKind};
 
 use super::method::method;
+use super::params::Auto;
 use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::{DAffine3, DVec3, PositionIndex, Vec3};
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::remesh::Changes;
+use crate::warning::{Warning, WarningCode};
+use automatic::Placing;
 use cloud::{BoxMap, MAX_POINTS, MIN_POINTS};
 use color::Coloring;
-use exterior::{Exterior, exterior_from_points, generate_exterior};
+use exterior::{Exterior, exterior_from_points, exterior_from_sides, generate_exterior};
 use extract::{Extraction, default_cell};
 use field::Field;
 use kernel::{Kernel, KernelTable};
@@ -124,7 +129,11 @@ pub struct ImplicitSurface {
     params: ImplicitParams,
     edits: PointEdits,
     samples: Option<Samples>,
+    /// Measures of the samples, and the values chosen by them; `None` before they are selected.
+    choice: Option<Choice>,
     exterior: Option<Exterior>,
+    /// Whether inside and outside may be confused; see [`Sides::are_doubtful`](automatic::Sides::are_doubtful).
+    doubtful_sides: bool,
     /// The current constraints on the implicit function, made from samples, exterior points and edits.
     constraints: Constraints,
     stage: Stage,
@@ -177,7 +186,8 @@ impl Solved {
 /// The stage of the reconstruction that the next call of [`ImplicitSurface::step`] works on, with its data.
 enum Stage {
     Subsample(Box<Sampling>),
-    Constrain,
+    /// The search for points on both sides of the surface; `None` before it, or without one.
+    Constrain(Option<Box<Placing>>),
     Solve(Box<Solver>),
     Extract(Box<Extraction>),
     Color(Box<ColoringState>),
@@ -246,7 +256,9 @@ impl ImplicitSurface {
             params: options.params.clone(),
             edits: PointEdits::default(),
             samples: None,
+            choice: None,
             exterior: None,
+            doubtful_sides: false,
             constraints: Constraints::default(),
             stage: first_stage(&options),
             options,
@@ -298,7 +310,7 @@ impl ImplicitSurface {
         let (before, slices) = (stage.phase(), std::mem::take(&mut self.slices));
         self.stage = match stage {
             Stage::Subsample(sampling) => self.subsample(sampling)?,
-            Stage::Constrain => self.constrain()?,
+            Stage::Constrain(placing) => self.constrain(placing)?,
             Stage::Solve(solver) => self.solve(solver)?,
             Stage::Extract(extraction) => self.extract(extraction)?,
             Stage::Color(state) => self.color(*state),
@@ -324,25 +336,55 @@ impl ImplicitSurface {
             euler: self.euler as i32,
             events: Changes::default(),
             times,
-            warnings: Vec::new(),
+            warnings: self.warnings(),
+        }
+    }
+
+    fn warnings(&self) -> Vec<Warning> {
+        let text = "the points hardly tell inside from outside: walls or gaps are about as thin as the points are apart or \
+                    scattered; components, handles and volume may be wrong";
+        if self.doubtful_sides && self.has_sides() {
+            vec![Warning::new(WarningCode::ThinParts, text)]
+        } else {
+            Vec::new()
         }
     }
 
     fn subsample(&mut self, mut sampling: Box<Sampling>) -> Result<Stage, MethodError> {
         self.samples = sampling.advance(&self.cloud)?;
-        Ok(if self.samples.is_some() { Stage::Constrain } else { Stage::Subsample(sampling) })
+        self.choice = self.samples.as_ref().map(|samples| Choice::of(&samples.cloud.points, samples.spacing));
+        Ok(if self.samples.is_some() { Stage::Constrain(None) } else { Stage::Subsample(sampling) })
     }
 
-    fn constrain(&mut self) -> Result<Stage, MethodError> {
-        self.make_constraints()?;
-        Ok(if self.exterior.is_some() { self.begin_solve() } else { first_stage(&self.options) })
+    /// Makes the constraints, those on both sides in slices.
+    fn constrain(&mut self, placing: Option<Box<Placing>>) -> Result<Stage, MethodError> {
+        let (Some(samples), Some(choice)) = (&self.samples, self.choice) else {
+            return Ok(first_stage(&self.options));
+        };
+        if !self.has_sides() {
+            self.exterior = Some(self.exterior_points(samples));
+        } else if let Some(mut placing) = placing {
+            let Some(sides) = placing.advance() else { return Ok(Stage::Constrain(Some(placing))) };
+            self.doubtful_sides = sides.are_doubtful();
+            self.exterior = Some(exterior_from_sides(&samples.cloud, sides));
+        } else {
+            let placing = Placing::new(&samples.cloud, choice, samples.spacing, SEED);
+            return Ok(Stage::Constrain(Some(Box::new(placing))));
+        }
+        self.combine()?;
+        Ok(self.begin_solve())
     }
 
-    /// Makes the exterior points, and builds the constraints on the implicit function from them, the samples and the
-    /// edits; does nothing before the samples are selected.
-    fn make_constraints(&mut self) -> Result<(), MethodError> {
-        let Some(samples) = &self.samples else { return Ok(()) };
-        let exterior = match &self.options.exterior {
+    /// Whether there are constraints on both sides of the surface: if the caller leaves that open, and knows no other
+    /// way to tell the sides.
+    fn has_sides(&self) -> bool {
+        let is_open = self.options.exterior.is_none() && self.options.cameras.is_empty();
+        self.params.lambda_exterior == Auto::Auto && is_open
+    }
+
+    /// Returns the points outside that the caller gave, or that are made from cameras, normals or the points.
+    fn exterior_points(&self, samples: &Samples) -> Exterior {
+        match &self.options.exterior {
             Some(given) => {
                 exterior_from_points(&samples.cloud, given.iter().map(|&p| self.map.in_box(p)).collect())
             }
@@ -352,15 +394,34 @@ impl ImplicitSurface {
                     cameras.map(|camera| camera.clone().transformed(&self.map.affine())).collect();
                 generate_exterior(&samples.cloud, &cameras, samples.spacing as f32, SEED)
             }
-        };
-        let constraints = self.edits.constraints(samples, &exterior, &self.original, &self.map)?;
+        }
+    }
+
+    /// Builds the constraints on the implicit function from samples, exterior points and edits; does nothing before
+    /// these are known.
+    fn combine(&mut self) -> Result<(), MethodError> {
+        let (Some(samples), Some(exterior)) = (&self.samples, &self.exterior) else { return Ok(()) };
+        let constraints = self.edits.constraints(samples, exterior, &self.original, &self.map)?;
         self.constraints = self.regularized(constraints);
-        self.exterior = Some(exterior);
         Ok(())
     }
 
+    /// Returns the parameters with those that are `auto` as they were chosen, once they are.
+    pub fn settled(&self) -> ImplicitParams {
+        self.choice.map_or_else(|| self.params.clone(), |choice| self.params.settled(&choice))
+    }
+
+    /// Returns what was measured on the sampled points, and chosen from that for parameters that are `auto`; `None` before
+    /// they are sampled.
+    pub fn choice(&self) -> Option<&Choice> {
+        self.choice.as_ref()
+    }
+
     fn regularized(&self, mut constraints: Constraints) -> Constraints {
-        constraints.regularize(self.params.lambda_surface, self.params.lambda_exterior);
+        let (given, settled) = (self.params.lambda_surface.given(), self.settled());
+        let chosen = settled.lambda_surface.given().unwrap_or_default();
+        let surface = given.map_or(chosen, |lambda| constraints.crowded(lambda));
+        constraints.regularize(surface, settled.lambda_exterior.given().unwrap_or_default());
         constraints
     }
 
@@ -373,7 +434,7 @@ impl ImplicitSurface {
     }
 
     fn new_solver(&self, constraints: &Constraints) -> Box<Solver> {
-        let kernel = Kernel::new(&self.params, constraints.radius());
+        let kernel = Kernel::new(&self.settled(), constraints.radius());
         Box::new(Solver::new(constraints, kernel, self.params.tolerance, SEED))
     }
 
@@ -389,7 +450,7 @@ impl ImplicitSurface {
             Some(kept) => kept,
             None => self.new_solver(&self.base_constraints()?),
         };
-        let kernel = Kernel::new(&self.params, self.constraints.radius());
+        let kernel = Kernel::new(&self.settled(), self.constraints.radius());
         let is_usable = solver.kernel() == kernel
             && solver.revise(&self.constraints, solved.weights_at(&self.constraints));
         is_usable.then_some(solver)
@@ -419,7 +480,7 @@ impl ImplicitSurface {
     /// Returns the error of a failed solve, and discards its linear system, so that later edits do not revise it.
     fn singular(&mut self) -> MethodError {
         (self.base_edits, self.solver) = (None, None);
-        let cause = if self.params.lambda_surface == 0.0 {
+        let cause = if self.params.lambda_surface == Auto::Given(0.0) {
             "lambdaSurface is 0 and some points are too close together; set it above 0"
         } else {
             "rounding errors exceed the tolerance; use a larger tolerance or lambda, or a narrower kernel"
@@ -431,7 +492,8 @@ impl ImplicitSurface {
         let Some(solved) = &self.solved else { return Ok(first_stage(&self.options)) };
         let points = self.in_world(&self.constraints.centres[..self.constraints.surface]);
         let level = self.iso_value(solved);
-        let extraction = Extraction::new(&solved.field, self.map, level, &points, self.cell())?;
+        let extraction =
+            Extraction::new(&solved.field, self.map, level, &points, self.cell(), !self.has_sides())?;
         Ok(Stage::Extract(Box::new(extraction)))
     }
 
@@ -513,7 +575,11 @@ impl ImplicitSurface {
         params.validate()?;
         let before = std::mem::replace(&mut self.params, params);
         let (now, only_extraction) = (&self.params, before.with_extraction_of(&self.params));
-        if before == *now || matches!(self.stage, Stage::Subsample(_) | Stage::Constrain) {
+        let other_sides = (before.lambda_exterior == Auto::Auto) != (now.lambda_exterior == Auto::Auto);
+        if other_sides && !matches!(self.stage, Stage::Subsample(_)) {
+            (self.stage, self.slices) = (Stage::Constrain(None), 0);
+        }
+        if before == *now || matches!(self.stage, Stage::Subsample(_) | Stage::Constrain(None)) {
             return Ok(());
         }
         if only_extraction == *now && !matches!(self.stage, Stage::Solve(_)) {
@@ -621,7 +687,7 @@ impl Stage {
     fn phase(&self) -> &'static str {
         match self {
             Self::Subsample(_) => "subsample",
-            Self::Constrain => "constraints",
+            Self::Constrain(_) => "constraints",
             Self::Solve(_) => "solve",
             Self::Extract(_) => "extract",
             Self::Color(_) | Self::Done => "colour",
@@ -631,7 +697,7 @@ impl Stage {
     fn progress(&self, cameras: usize) -> f64 {
         match self {
             Self::Subsample(sampling) => sampling.progress(),
-            Self::Constrain => 0.0,
+            Self::Constrain(placing) => placing.as_ref().map_or(0.0, |placing| placing.progress()),
             Self::Solve(solver) => solver.progress(),
             Self::Extract(extraction) => extraction.progress(),
             Self::Color(state) => state.camera as f64 / (cameras + 1) as f64,

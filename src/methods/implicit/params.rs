@@ -1,6 +1,7 @@
 //! Parameters of the implicit surface, with their ranges, labels and help texts.
 
-use crate::methods::params::{choices, parameters};
+use super::automatic::Choice;
+use crate::methods::params::{Auto, choices, parameters};
 use crate::methods::{MethodError, ParamScale, Parameters};
 
 parameters! {
@@ -17,7 +18,7 @@ parameters! {
         },
         /// δ of the multi-order kernel, its first-order smoothness, in inverse units of the normalised box: larger
         /// values pull the surface tight around the points.
-        pub delta: f64 = 5.0 => {
+        pub delta: Auto = Auto::Given(5.0) => {
             name: "delta",
             label: "First-order smoothness",
             help: "Larger values pull the surface tight around the points, like a membrane; from 25 on it breaks up at large gaps.",
@@ -53,7 +54,7 @@ parameters! {
         /// Regularisation λ of surface constraints, before confidences and the number of points are taken into account:
         /// the larger, the more the implicit function f may differ from 0 at the points; with 0 the surface
         /// interpolates them.
-        pub lambda_surface: f64 = 0.001 => {
+        pub lambda_surface: Auto = Auto::Given(0.001) => {
             name: "lambdaSurface",
             label: "Regularization, surface",
             help: "0 interpolates every point; larger values tolerate noise and give a smoother surface.",
@@ -62,8 +63,8 @@ parameters! {
             step: 0.0001,
         },
         /// Regularisation λ of exterior constraints: the larger, the more the implicit function f may differ from −1 at
-        /// them.
-        pub lambda_exterior: f64 = 2.0 => {
+        /// them. [`Auto::Auto`] adds constraints of value 1 inside, and makes both as soft as the noise demands.
+        pub lambda_exterior: Auto = Auto::Given(2.0) => {
             name: "lambdaExterior",
             label: "Regularization, exterior",
             help: "How much exterior constraints may be missed: they only fix the orientation, so a large value is right.",
@@ -137,10 +138,22 @@ impl ImplicitParams {
         Self { cell: other.cell, level: other.level, ..self.clone() }
     }
 
+    /// Returns these parameters with those that are [`Auto::Auto`] as they were chosen.
+    pub fn settled(&self, choice: &Choice) -> Self {
+        let settled = |value: Auto, chosen: f64| Auto::Given(value.given().unwrap_or(chosen));
+        Self {
+            delta: settled(self.delta, choice.delta),
+            lambda_surface: settled(self.lambda_surface, choice.lambda_surface),
+            lambda_exterior: settled(self.lambda_exterior, choice.lambda_exterior),
+            ..self.clone()
+        }
+    }
+
     /// Returns a warning, to be shown to the user, if δ of the multi-order kernel is so large that the surface may
     /// break up; `None` otherwise.
     pub fn warning(&self) -> Option<&'static str> {
-        (self.kernel == KernelKind::MultiOrder && self.delta >= LARGE_DELTA).then_some(
+        let is_large = self.delta.given().is_some_and(|delta| delta >= LARGE_DELTA);
+        (self.kernel == KernelKind::MultiOrder && is_large).then_some(
             "delta ≥ 25: at large gaps between points the function falls to 0 inside, and the surface breaks up",
         )
     }

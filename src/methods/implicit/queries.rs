@@ -37,11 +37,15 @@ impl ImplicitSurface {
         self.solved.as_ref().ok_or_else(|| MethodError::invalid(what, problem))
     }
 
-    /// Returns the centres of the surface constraints and of the exterior constraints, in world units; both lists are
-    /// empty until the constraints are made in the first steps.
-    pub fn constraints(&self) -> [Vec<Vec3>; 2] {
-        let (surface, outside) = self.constraints.centres.split_at(self.constraints.surface);
-        [self.in_world(surface), self.in_world(outside)]
+    /// Returns the centres of the constraints on the surface, outside and inside, in world units; all lists are empty until
+    /// the constraints are made in the first steps.
+    pub fn constraints(&self) -> [Vec<Vec3>; 3] {
+        let all = self.constraints.centres.iter().zip(&self.constraints.values);
+        [0.0, -1.0, 1.0].map(|value| {
+            let chosen: Vec<Vec3> =
+                all.clone().filter(|&(_, &other)| other == value).map(|(&p, _)| p).collect();
+            self.in_world(&chosen)
+        })
     }
 
     /// Returns the input points with the edits applied: without those removed, with those added; in world units.

@@ -178,7 +178,12 @@ impl ImplicitSurface {
             self.advance()?;
         }
         if !matches!(saved_stage, SavedStage::Subsample | SavedStage::Constrain) {
-            self.make_constraints()?;
+            // Leaves them as at the last full solve.
+            let base = self.base_edits.take();
+            while matches!(self.stage, Stage::Constrain(_)) {
+                self.advance()?;
+            }
+            self.base_edits = base;
         }
         self.stage = match saved_stage {
             SavedStage::Solve(position, revised) => {
@@ -223,7 +228,7 @@ impl Stage {
     fn reached(&self) -> SavedStage {
         match self {
             Self::Subsample(_) => SavedStage::Subsample,
-            Self::Constrain => SavedStage::Constrain,
+            Self::Constrain(_) => SavedStage::Constrain,
             Self::Solve(solver) => SavedStage::Solve(solver.position(), solver.is_revised()),
             Self::Extract(_) => SavedStage::Extract,
             Self::Color(_) => SavedStage::Color,

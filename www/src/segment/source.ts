@@ -15,6 +15,8 @@ import { labelsIn } from './slicer';
 
 /** Number of different values beyond which a volume is no label map. */
 const MOST_LABELS = 65_536;
+/** Largest number of labels that are opened: each has a row in the list, and a surface that is drawn by itself. */
+const MOST_OPENED = 4000;
 /** Largest distance in voxels between the corners of two grids that count as the same one. */
 const TOLERANCE = 0.01;
 /** Largest distance in voxels, along an axis, between the voxels of two grids that count as the same. */
@@ -123,7 +125,8 @@ function labelsOf({ name, init, known, isCropped }: NamedVolume, volume: Volume)
   try {
     if (!isCropped) requireSameGrid(map, volume);
     // Says what is wrong with voxels that are no labels.
-    map.labels();
+    const labels = map.labels().length;
+    if (labels > MOST_OPENED) throw new Refusal('too-large', text('segment.tooMany', { labels, most: MOST_OPENED }));
     const count = map.dims.reduce((product, size) => product * size, 1);
     const isPlain = (init.slope ?? 1) === 1 && (init.intercept ?? 0) === 0;
     const voxels = isPlain ? (init.data.slice(0, count) as LabelArray) : Int32Array.from(map.intensities());

@@ -13,6 +13,7 @@ const OF_RESULTS: readonly string[] = [
   'ends-in-frame',
   'small-object',
   'thin-label',
+  'thin-parts',
   'uneven-brightness',
 ];
 

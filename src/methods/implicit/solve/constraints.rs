@@ -10,7 +10,7 @@ pub struct Constraints {
     /// Positions of the constraints, in units of the normalised box, all distinct; those of surface constraints come
     /// first.
     pub centres: Vec<Vec3>,
-    /// Prescribed value of the implicit function f at each centre: 0 on the surface, −1 outside.
+    /// Prescribed value of the implicit function f at each centre: 0 on the surface, −1 outside, 1 inside.
     pub values: Vec<f64>,
     /// Regularisation λ of each constraint, at least 0: f differs from the prescribed value by λ times the weight of
     /// the kernel at this centre.
@@ -22,26 +22,32 @@ pub struct Constraints {
 }
 
 impl Constraints {
-    /// Creates constraints of value 0 at the points of `surface` and −1 at those `outside`; λ is 0 until
-    /// [`Self::regularize`].
-    pub fn new(surface: &Cloud, outside: &[Vec3]) -> Self {
-        let count = surface.len() + outside.len();
-        let value = |i: usize| if i < surface.len() { 0.0 } else { -1.0 };
+    /// Creates constraints of value 0 at the points of `surface`, −1 at those `outside` and 1 at those `inside`; λ is 0
+    /// until [`Self::regularize`].
+    pub fn new(surface: &Cloud, outside: &[Vec3], inside: &[Vec3]) -> Self {
+        let parts = [(&surface.points[..], 0.0), (outside, -1.0), (inside, 1.0)];
+        let centres: Vec<Vec3> = parts.iter().flat_map(|(points, _)| points.iter().copied()).collect();
         Self {
-            centres: surface.points.iter().chain(outside).copied().collect(),
-            values: (0..count).map(value).collect(),
-            lambda: vec![0.0; count],
+            values: parts
+                .iter()
+                .flat_map(|&(points, value)| std::iter::repeat_n(value, points.len()))
+                .collect(),
+            lambda: vec![0.0; centres.len()],
+            centres,
             surface: surface.len(),
             confidence: surface.confidence.clone(),
         }
     }
 
-    /// Sets the regularisation λ: `outside` for exterior constraints, `surface` divided by the confidence for surface
-    /// constraints. From 3,000 surface constraints on, their λ grows in proportion to their number, so that more points
-    /// give a better surface and not a rougher one.
-    pub fn regularize(&mut self, surface: f64, outside: f64) {
+    /// Returns a given λ of surface constraints for their number: from 3,000 on, it grows in proportion to that, so that more
+    /// points give a better surface and not a rougher one.
+    pub fn crowded(&self, lambda: f64) -> f64 {
         let crowd = self.surface as f64 / USUAL_POINTS;
-        let surface = if crowd > 1.0 { surface * crowd } else { surface };
+        if crowd > 1.0 { lambda * crowd } else { lambda }
+    }
+
+    /// Sets the regularisation λ: `surface` divided by the confidence for surface constraints, `outside` for all others.
+    pub fn regularize(&mut self, surface: f64, outside: f64) {
         for (i, lambda) in self.lambda.iter_mut().enumerate() {
             let sure = self.confidence.as_ref().and_then(|all| all.get(i)).map_or(1.0, |&c| f64::from(c));
             *lambda = if i < self.surface { surface / sure } else { outside };

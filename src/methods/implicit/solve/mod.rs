@@ -324,8 +324,8 @@ mod tests {
         let sizes = (0..count / 10 + 16).map(|i| if i < count / 10 { 1.1 } else { 2.0 });
         let far: Vec<Vec3> = sizes.map(&mut point).collect();
         let confidence = confidence.then(|| (0..count).map(|i| 0.02 + (i % 50) as f32 / 51.0).collect());
-        let mut constraints = Constraints::new(&Cloud { points, confidence, ..Cloud::default() }, &far);
-        constraints.regularize(surface, outside);
+        let mut constraints = Constraints::new(&Cloud { points, confidence, ..Cloud::default() }, &far, &[]);
+        constraints.regularize(constraints.crowded(surface), outside);
         constraints
     }
 
@@ -497,8 +497,8 @@ mod tests {
                 (0..300).map(|i| (middles[i % 2] + direction(&mut random) * size).as_vec3()).collect();
             let cloud = Cloud { points, ..Cloud::default() }.distinct();
             let outside: Vec<Vec3> = (0..16).map(|_| (direction(&mut random) * 2.0).as_vec3()).collect();
-            let mut constraints = Constraints::new(&cloud, &outside);
-            constraints.regularize(0.001, 2.0);
+            let mut constraints = Constraints::new(&cloud, &outside, &[]);
+            constraints.regularize(constraints.crowded(0.001), 2.0);
             assert_eq!(constraints.shared_centre(), None);
             for kernel in kernels(constraints.radius()) {
                 let (solution, _) = solved(&constraints, kernel, 1e-6);
@@ -532,8 +532,8 @@ mod tests {
         points.extend((0..30).map(|_| (direction(&mut random) * 0.85).as_vec3()));
         let mut far: Vec<Vec3> = outside.iter().skip(3).copied().collect();
         far.push((direction(&mut random) * 1.3).as_vec3());
-        let mut changed = Constraints::new(&Cloud { points, ..Cloud::default() }, &far);
-        changed.regularize(base.lambda[0], base.lambda[base.surface]);
+        let mut changed = Constraints::new(&Cloud { points, ..Cloud::default() }, &far, &[]);
+        changed.regularize(changed.crowded(base.lambda[0]), base.lambda[base.surface]);
         changed
     }
 

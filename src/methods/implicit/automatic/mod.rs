@@ -1,0 +1,95 @@
+//! The choices of an implicit surface, from its points, where the parameters leave it any: λ and δ by their density and
+//! noise, and constraints on both sides of the surface.
+//!
+//! Points outside alone, as in the paper, hold f near −1 on one side and leave it flat on the other: where noise needs a
+//! large λ, the surface recedes. Pairs of points on both sides give f a slope.
+
+mod quadrics;
+mod sides;
+mod winding;
+
+pub use sides::{Placing, Sides};
+
+use crate::math::{Vec3, lower};
+
+use crate::math::order::median;
+use crate::spatial::PointGrid;
+use quadrics::Quadric;
+use serde::Serialize;
+use std::f64::consts::PI;
+
+/// Numbers of nearest points to which quadrics are fitted, to measure the noise: with few, they follow details; with more,
+/// the estimate is more exact. The smaller estimate is right.
+const NEIGHBOURS: [usize; 2] = [24, 12];
+/// Largest number of points at which quadrics are fitted to measure noise and density.
+const TRIALS: usize = 300;
+/// Number of points below which noise looks like shape.
+const FEW_POINTS: usize = 100;
+/// Number of points below which λ is that of surfaces with large gaps, [`SPARSE_LENGTH`].
+const SPARSE_POINTS: usize = 200;
+/// Length that λ damps for few points, in units of the normalised box.
+const SPARSE_LENGTH: f64 = 0.1;
+/// Length that λ damps: a share of the distance between points, and one of the noise.
+const LENGTH: [f64; 2] = [0.5, 0.5];
+/// λ of constraints beside the surface, relative to that of those on it, and the largest. They are soft, so that wrong ones
+/// yield.
+const SOFTNESS: [f64; 2] = [300.0, 2.0];
+/// δ for each point along a unit of length, and the largest: with more, gaps between few points are not closed.
+const SMOOTHNESS: [f64; 2] = [0.3, 5.0];
+
+/// Measures of the points of an implicit surface, and the values chosen by them for parameters that are `auto`; in units of
+/// the normalised box, in which the longest side of the points' bounding box is 2.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Choice {
+    /// Estimated noise of the points: their standard deviation from the surface along its normal; 0 for fewer than a hundred
+    /// points.
+    pub noise: f64,
+    /// Number of points on a unit of area.
+    pub density: f64,
+    /// λ of constraints on the surface.
+    pub lambda_surface: f64,
+    /// λ of constraints on both sides of it.
+    pub lambda_exterior: f64,
+    /// First-order smoothness δ.
+    pub delta: f64,
+}
+
+impl Choice {
+    /// Measures points whose mean distance to the nearest neighbour is `spacing`, and chooses.
+    pub fn of(points: &[Vec3], spacing: f64) -> Self {
+        let radius = NEIGHBOURS[1] as f32 * spacing as f32 * 0.25;
+        let grid = PointGrid::of(points, radius);
+        let step = points.len().div_ceil(TRIALS);
+        let [wide, narrow] = NEIGHBOURS.map(|count| {
+            let some = points.iter().step_by(step);
+            some.filter_map(|&p| Quadric::around(&grid, p, count, radius)).collect::<Vec<_>>()
+        });
+        let deviation = |fits: &[Quadric]| median(fits.iter().map(|fit| fit.deviation)).unwrap_or(0.0);
+        let noise = if points.len() < FEW_POINTS { 0.0 } else { lower(deviation(&wide), deviation(&narrow)) };
+        let reach = f64::from(median(wide.iter().map(|fit| fit.radius)).unwrap_or(2.0));
+        let within = NEIGHBOURS[0].min(points.len()) as f64;
+        Self::from_measures(points.len(), within / (PI * reach * reach), f64::from(noise))
+    }
+
+    /// Chooses for a number of points with a density and noise.
+    ///
+    /// A wave of wave number k on the surface is damped by 1 / (1 + 4 k³ λ / density): λ is such that this is ½ for a
+    /// wave number that is the inverse of a length.
+    fn from_measures(count: usize, density: f64, noise: f64) -> Self {
+        let length = if count < SPARSE_POINTS {
+            SPARSE_LENGTH
+        } else {
+            LENGTH[0] / density.sqrt() + LENGTH[1] * noise
+        };
+        let lambda_surface = length * length * length * density / 4.0;
+        let bounded = |value: f64, most: f64| if value < most { value } else { most };
+        Self {
+            noise,
+            density,
+            lambda_surface,
+            lambda_exterior: bounded(SOFTNESS[0] * lambda_surface, SOFTNESS[1]),
+            delta: bounded(SMOOTHNESS[0] * density.sqrt(), SMOOTHNESS[1]),
+        }
+    }
+}

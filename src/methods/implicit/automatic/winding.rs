@@ -1,0 +1,150 @@
+//! Global orientation of normals: they are made consistent with the winding number that they define, which is 1 inside, 0
+//! outside and ½ at the surface, and falls along the normal (Lin, Shi & Liu, *Fast and globally consistent normal
+//! orientation based on the winding number normal consistency*, 2024).
+
+use crate::math::order::sort_by_rank;
+use crate::math::{DVec3, Vec3};
+use std::f64::consts::PI;
+
+/// Largest number of parts that are turned around.
+const MOST_PARTS: usize = 64;
+
+/// The winding number of a surface that is known at some positions: a sum over vectors, the normals there, each as long as
+/// the area that it stands for.
+#[derive(Clone, Debug)]
+pub struct Winding {
+    positions: Vec<DVec3>,
+    vectors: Vec<DVec3>,
+    /// The square of the length below which distances are smoothed.
+    smoothing: f64,
+}
+
+impl Winding {
+    /// Creates that of a surface with unit `normals`, which stand for `area` each; distances are smoothed below `width`.
+    pub fn new(positions: &[Vec3], normals: impl Iterator<Item = Vec3>, area: f64, width: f64) -> Self {
+        Self {
+            positions: positions.iter().map(|p| p.as_dvec3()).collect(),
+            vectors: normals.map(|n| n.as_dvec3() * area).collect(),
+            smoothing: width * width,
+        }
+    }
+
+    /// Makes the vectors more consistent: a step of steepest descent of the squared differences of the winding number from
+    /// ½, after which each vector is turned to where the winding number falls. Distances are smoothed below `width`. Takes
+    /// time in proportion to the square of the number of positions.
+    pub fn improve(&mut self, width: f64) {
+        self.smoothing = width * width;
+        let errors: Vec<f64> = self.positions.iter().map(|&x| 0.5 - self.sum(x, &self.vectors)).collect();
+        let direction: Vec<DVec3> = self.positions.iter().map(|&x| self.transposed(x, &errors)).collect();
+        let change: Vec<f64> = self.positions.iter().map(|&x| self.sum(x, &direction)).collect();
+        let squared: f64 = change.iter().map(|c| c * c).sum();
+        if squared > 0.0 {
+            let step = direction.iter().map(|d| d.length_squared()).sum::<f64>() / squared;
+            self.vectors.iter_mut().zip(&direction).for_each(|(v, d)| *v += *d * step);
+        }
+        let falls: Vec<DVec3> = self.positions.iter().map(|&x| self.fall(x)).collect();
+        self.vectors.iter_mut().zip(falls).for_each(|(v, fall)| *v = fall.normalize_or_zero() * v.length());
+    }
+
+    /// Turns whole `parts` around, given as indices of the positions, as long as that brings the winding number at all positions
+    /// nearer to ½. Within a part, vectors are consistent already; those of a cavity have to point into it.
+    pub fn turn_parts(&mut self, parts: &[Vec<u32>]) {
+        let mut largest: Vec<&Vec<u32>> = parts.iter().collect();
+        sort_by_rank(&mut largest, |part| u64::MAX - part.len() as u64);
+        largest.truncate(MOST_PARTS);
+        let of_part = |part: &&Vec<u32>| {
+            let mut alone = vec![DVec3::ZERO; self.vectors.len()];
+            part.iter().for_each(|&i| alone[i as usize] = self.vectors[i as usize]);
+            self.positions.iter().map(|&x| self.sum(x, &alone)).collect()
+        };
+        let found: Vec<Vec<f64>> = largest.iter().map(of_part).collect();
+        let mut errors: Vec<f64> = self.positions.iter().map(|&x| self.sum(x, &self.vectors) - 0.5).collect();
+        let mut signs = vec![1.0; largest.len()];
+        for _ in 0..MOST_PARTS {
+            // The change of the sum of squared errors by a turn of each part.
+            let change = |k: usize| {
+                let turned = errors
+                    .iter()
+                    .zip(&found[k])
+                    .map(|(error, own)| own * signs[k] * (own * signs[k] - error));
+                4.0 * turned.sum::<f64>()
+            };
+            let changes: Vec<f64> = (0..largest.len()).map(change).collect();
+            let best =
+                (0..largest.len()).fold(0, |best, k| if changes[k] < changes[best] { k } else { best });
+            if changes.get(best).is_none_or(|&change| change >= 0.0) {
+                break;
+            }
+            errors.iter_mut().zip(&found[best]).for_each(|(error, own)| *error -= 2.0 * signs[best] * own);
+            signs[best] = -signs[best];
+            largest[best].iter().for_each(|&i| self.vectors[i as usize] = -self.vectors[i as usize]);
+        }
+    }
+
+    /// Returns the winding number at `x`.
+    pub fn at(&self, x: Vec3) -> f64 {
+        self.sum(x.as_dvec3(), &self.vectors)
+    }
+
+    /// Returns the vector at each position.
+    pub fn vectors(&self) -> &[DVec3] {
+        &self.vectors
+    }
+
+    /// Returns the winding number at `x` that other vectors at the positions define.
+    fn sum(&self, x: DVec3, vectors: &[DVec3]) -> f64 {
+        let terms = self.positions.iter().zip(vectors).map(|(p, v)| v.dot(self.influence(*p - x)));
+        terms.sum::<f64>() / (4.0 * PI)
+    }
+
+    /// Returns, of the product of `values` at the positions with the transposed matrix of [`Self::sum`], the entry at `x`.
+    fn transposed(&self, x: DVec3, values: &[f64]) -> DVec3 {
+        let terms = self.positions.iter().zip(values).map(|(p, &value)| self.influence(x - *p) * value);
+        terms.sum::<DVec3>() / (4.0 * PI)
+    }
+
+    fn influence(&self, offset: DVec3) -> DVec3 {
+        let squared = offset.length_squared() + self.smoothing;
+        offset / (squared * squared.sqrt())
+    }
+
+    /// Returns the direction in which the winding number falls at a position: its negative gradient, but for the part of
+    /// the vector there, which would fall along itself on either side.
+    fn fall(&self, x: DVec3) -> DVec3 {
+        let others = self.positions.iter().zip(&self.vectors).filter(|&(p, _)| *p != x);
+        let terms = others.map(|(p, v)| {
+            let offset = *p - x;
+            let squared = offset.length_squared() + self.smoothing;
+            (*v - offset * (3.0 * v.dot(offset) / squared)) / (squared * squared.sqrt())
+        });
+        terms.sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::methods::implicit::cloud::tests::on_ball;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn normals_become_consistent_and_the_winding_number_that_of_a_ball() {
+        let positions = on_ball(300);
+        let wrong = positions.iter().zip(0..).map(|(&p, i)| p * [1.0, 1.0, -1.0][i % 3]);
+        let area = 4.0 * PI / 300.0;
+        let mut winding = Winding::new(&positions, wrong, area, 0.2);
+        for _ in 0..15 {
+            winding.improve(0.2);
+        }
+        let outwards = winding.vectors().iter().zip(&positions).filter(|(v, p)| v.dot(p.as_dvec3()) > 0.0);
+        assert_eq!(outwards.count(), 300);
+        let exact = Winding::new(&positions, positions.iter().copied(), area, 0.05);
+        for (x, expected) in [(0.0, 1.0), (0.7, 1.0), (1.4, 0.0), (5.0, 0.0)] {
+            for (winding, error) in [(&winding, 0.25), (&exact, 0.1)] {
+                let found = winding.at(Vec3::X * x);
+                assert!((found - expected).abs() < error, "{x}: {found}");
+            }
+        }
+    }
+}

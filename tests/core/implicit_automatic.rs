@@ -1,0 +1,188 @@
+//! The implicit surface with parameters that it chooses from its points.
+
+use super::common::euler_of_parts;
+use super::common::points::{Shape, noisy, pair, sphere, torus};
+use std::f64::consts::PI;
+use vesicle::math::Vec3;
+use vesicle::mesh::{measure, report};
+use vesicle::methods::Auto;
+use vesicle::methods::implicit::{Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits};
+use vesicle::warning::WarningCode;
+#[cfg(target_arch = "wasm32")]
+use wasm_bindgen_test::wasm_bindgen_test as test;
+
+fn automatic() -> ImplicitParams {
+    let [delta, lambda_surface, lambda_exterior] = [Auto::Auto; 3];
+    ImplicitParams { delta, lambda_surface, lambda_exterior, ..ImplicitParams::default() }
+}
+
+fn begun(cloud: Cloud) -> ImplicitSurface {
+    ImplicitSurface::new(cloud, ImplicitOptions { params: automatic(), ..ImplicitOptions::default() })
+        .unwrap()
+}
+
+fn finish(surface: &mut ImplicitSurface) {
+    while !surface.step().unwrap().done {}
+    assert!(report(surface.surface()).unwrap().is_healthy());
+}
+
+fn finished(points: Vec<Vec3>) -> ImplicitSurface {
+    let mut surface = begun(Cloud { points, ..Cloud::default() });
+    finish(&mut surface);
+    surface
+}
+
+fn volume(surface: &ImplicitSurface) -> f64 {
+    measure(surface.surface()).volume
+}
+
+const BALL: f64 = 4.0 / 3.0 * PI;
+
+#[test]
+fn noise_is_measured_and_lambda_grows_with_it() {
+    let choices = [0.0, 0.01, 0.02].map(|noise| {
+        let mut surface = begun(Cloud { points: noisy(torus, 3000, noise, 1), ..Cloud::default() });
+        assert!(surface.choice().is_none());
+        while surface.choice().is_none() {
+            surface.step().unwrap();
+        }
+        let choice = *surface.choice().unwrap();
+        assert!((choice.noise - noise).abs() < 0.3 * noise + 1e-3, "{noise}: {choice:?}");
+        choice
+    });
+    assert!(choices[0].lambda_surface < choices[1].lambda_surface);
+    assert!(choices[1].lambda_surface < choices[2].lambda_surface);
+    let settled = automatic().settled(&choices[2]);
+    assert_eq!(settled.lambda_surface, Auto::Given(choices[2].lambda_surface));
+}
+
+/// Points that leave gaps larger than parts of the surface, where points outside alone give nothing.
+#[test]
+fn a_few_points_on_a_sphere_give_a_ball() {
+    for count in [20, 50, 100] {
+        let found = volume(&finished(noisy(sphere, count, 0.0, 7)));
+        assert!((found / BALL - 1.0).abs() < 0.2, "{count} points: {found} for {BALL}");
+    }
+}
+
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn noise_neither_shrinks_shapes_nor_changes_their_topology() {
+    let shapes: [(Shape, &[i64], f64); 3] =
+        [(sphere, &[2], BALL), (torus, &[0], 2.0 * PI * PI * 0.7 * 0.09), (pair, &[2, 2], BALL * 0.167_875)];
+    for (shape, euler, expected) in shapes {
+        let surface = finished(noisy(shape, 3000, 0.02, 1));
+        assert_eq!(euler_of_parts(surface.surface()), euler);
+        let share = volume(&surface) / expected;
+        assert!((share - 1.0).abs() < 0.03, "{share}");
+    }
+}
+
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn two_balls_with_a_small_gap_stay_apart() {
+    for gap in [0.1, 0.3] {
+        let ball = |seed: u64, side: f32| {
+            let ball = noisy(sphere, 1500, 0.0, seed);
+            ball.into_iter().map(move |p| p + Vec3::X * side * (1.0 + gap / 2.0)).collect::<Vec<_>>()
+        };
+        let surface = finished([ball(1, -1.0), ball(2, 1.0)].concat());
+        assert_eq!(euler_of_parts(surface.surface()), [2, 2], "gap {gap}");
+        assert!((volume(&surface) / (2.0 * BALL) - 1.0).abs() < 0.01);
+    }
+}
+
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn a_cavity_stays_hollow() {
+    let shell: Vec<Vec3> = noisy(sphere, 2000, 0.0, 1)
+        .into_iter()
+        .chain(noisy(sphere, 800, 0.0, 2).iter().map(|p| p * 0.6))
+        .collect();
+    let surface = finished(shell);
+    assert_eq!(euler_of_parts(surface.surface()), [2, 2]);
+    let expected = BALL * (1.0 - 0.216);
+    assert!((volume(&surface) / expected - 1.0).abs() < 0.02, "{} for {expected}", volume(&surface));
+}
+
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn parts_as_thin_as_the_points_are_scattered_are_doubtful() {
+    let codes = |points: Vec<Vec3>| {
+        let mut surface = begun(Cloud { points, ..Cloud::default() });
+        loop {
+            let report = surface.step().unwrap();
+            if report.done {
+                return report.warnings.iter().map(|warning| warning.code).collect::<Vec<_>>();
+            }
+        }
+    };
+    let [clean, noisy] = [0.0, 0.02].map(|noise| noisy(sphere, 2000, noise, 3));
+    let flattened = |height: f32| {
+        let points = clean.iter().zip(&noisy);
+        points.map(|(p, q)| Vec3::new(p.x, p.y, p.z * height) + (q - p)).collect::<Vec<_>>()
+    };
+    assert_eq!(codes(flattened(1.0)), []);
+    assert_eq!(codes(flattened(0.03)), [WarningCode::ThinParts]);
+}
+
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn normals_that_are_given_decide_the_side() {
+    let points = noisy(sphere, 1500, 0.0, 3);
+    let inwards: Vec<Vec3> = points.iter().map(|p| -p.normalize()).collect();
+    let mut surface = begun(Cloud { points, normals: Some(inwards), ..Cloud::default() });
+    while !surface.step().unwrap().done {}
+    // Inside and outside are exchanged.
+    assert!(surface.evaluate(&[Vec3::ZERO]).unwrap()[0] < 0.0);
+}
+
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn the_same_settings_give_the_same_bits_however_they_are_reached() {
+    let points = noisy(torus, 1200, 0.01, 5);
+    let edits = PointEdits { removed: (0..40).collect(), ..PointEdits::default() };
+    let direct = finished(points.clone());
+    let mut other = ImplicitSurface::new(
+        Cloud { points: points.clone(), ..Cloud::default() },
+        ImplicitOptions::default(),
+    )
+    .unwrap();
+    for early in [false, true] {
+        for _ in 0..if early { 5 } else { 100_000 } {
+            if other.step().unwrap().done {
+                break;
+            }
+        }
+        other.set_params(automatic()).unwrap();
+        finish(&mut other);
+        assert!(other.surface() == direct.surface(), "set early: {early}");
+        other.set_params(ImplicitParams { lambda_surface: Auto::Given(0.1), ..automatic() }).unwrap();
+        finish(&mut other);
+        assert!(other.surface() != direct.surface());
+        other.set_edits(edits.clone()).unwrap();
+        other.set_params(ImplicitParams::default()).unwrap();
+        other.set_edits(PointEdits::default()).unwrap();
+    }
+}
+
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn a_saved_run_continues_with_the_same_bits() {
+    let cloud = Cloud { points: noisy(pair, 900, 0.01, 5), ..Cloud::default() };
+    let whole = finished(cloud.points.clone());
+    let mut running = begun(cloud.clone());
+    for steps in 0.. {
+        let done = running.step().unwrap().done;
+        if done || steps % 7 == 0 {
+            let mut resumed = begun(cloud.clone());
+            resumed.restore(&running.save()).unwrap();
+            assert_eq!(resumed.save(), running.save());
+            finish(&mut resumed);
+            assert!(resumed.surface() == whole.surface(), "after {steps} steps");
+        }
+        if done {
+            break;
+        }
+    }
+}
