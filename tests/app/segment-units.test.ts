@@ -1,6 +1,7 @@
 /** Parts of the Segment lab that need no browser. */
 import { describe, expect, test } from 'vitest';
 import { randomNumbers } from '../../bench/random.mjs';
+import init, { Volume } from '../../pkg/index.js';
 import { SegmentEditing } from '../../www/src/labs/segment-editing';
 import { fromHash, INITIAL_VIEW, linkOf, toHash } from '../../www/src/labs/segment-link';
 import { UndoStack } from '../../www/src/labs/undo';
@@ -11,6 +12,7 @@ import { labelHead, labelTooth } from '../../www/src/segment/labelling';
 import { freeValue, newLabel, rgbOf } from '../../www/src/segment/labels';
 import type { LabelArray, Vec3 } from '../../www/src/segment/protocol';
 import { boxOf, grown, union } from '../../www/src/segment/region';
+import { openImage } from '../../www/src/segment/source';
 import type { ToolSettings } from '../../www/src/ui/segment-tools';
 
 const DIMS: Vec3 = [9, 7, 5];
@@ -289,4 +291,17 @@ describe('fill', () => {
       expect(filled()).toBeGreaterThan((DIMS[0] - 1) * DIMS[1] * (extent === 'slice' ? 1 : DIMS[2]));
     }
   });
+});
+
+test('a label map of more labels than the list can show is refused', async () => {
+  await init();
+  const side = 17;
+  const file = (name: string, labels: number) => {
+    const data = Uint16Array.from({ length: side ** 3 }, (_, i) => i % labels);
+    return { name, bytes: new Volume({ data, dims: [side, side, side] }).toNifti() };
+  };
+  const opened = (labels: number) => openImage({ files: [file('a.nii', 300), file('label.nii', labels)] } as never);
+  const { map } = await opened(4001);
+  expect(rangeOf(map.voxels)).toEqual([0, 4000]);
+  await expect(opened(4002)).rejects.toThrow('4001 labels; the app shows at most 4000');
 });
