@@ -302,6 +302,6 @@ test('a label map of more labels than the list can show is refused', async () =>
   };
   const opened = (labels: number) => openImage({ files: [file('a.nii', 300), file('label.nii', labels)] } as never);
   const { map } = await opened(4001);
-  expect(rangeOf(map.voxels)).toEqual([0, 4000]);
+  expect(Math.max(...map.voxels)).toBe(4000);
   await expect(opened(4002)).rejects.toThrow('4001 labels; the app shows at most 4000');
 });
