@@ -253,7 +253,13 @@ export class TrackLab extends RunLab<TrackExample> {
     }
   }
 
+  protected override closed(): void {
+    this.#results.close();
+  }
+
   #onEvent(event: WorkerEvent): void {
+    // What a state is of was displayed before.
+    if (event.event === 'state') this.#results.catchUp();
     if (this.takes(event)) return;
     if (event.event === 'preparing') this.ui.status.say(event.what);
     else if (event.event === 'comparing') this.ui.compare.showProgress(event.part, event.phase);
