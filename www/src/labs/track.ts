@@ -258,7 +258,7 @@ export class TrackLab extends RunLab<TrackExample> {
   }
 
   #onEvent(event: WorkerEvent): void {
-    // What a state is of was displayed before.
+    // A state is that of the frames that are displayed.
     if (event.event === 'state') this.#results.catchUp();
     if (this.takes(event)) return;
     if (event.event === 'preparing') this.ui.status.say(event.what);
