@@ -84,7 +84,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
    * Creates the surfaces along the faces of the voxels; the first steps smooth them.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the option: a volume that is no label map, a label that it
-   *   does not have, too many labels; `too-large`.
+   *   does not have, too many labels, surfaces through more than 8 million cells of its grid; `too-large`.
    */
   constructor(given: LabelOptions) {
     const { volume, handle } = given instanceof Created ? given : create(given);

@@ -2,6 +2,7 @@
 //! quadric errors, eigenvectors of symmetric matrices, linear systems, sorting, grouping and random numbers.
 
 mod bounds;
+pub mod cholesky;
 mod conjugate_gradients;
 pub mod crossing;
 mod groups;

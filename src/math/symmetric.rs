@@ -3,6 +3,11 @@
 
 use super::{DMat3, DVec3};
 
+/// Returns p pᵀ, the outer product of a vector with itself: sums of it are covariances.
+pub fn outer(p: DVec3) -> DMat3 {
+    DMat3::from_cols(p * p.x, p * p.y, p * p.z)
+}
+
 /// Maximum number of Jacobi sweeps over all off-diagonal entries. Jacobi converges quadratically, and 6 sweeps were the
 /// most observed.
 const SWEEPS: usize = 16;
@@ -140,9 +145,9 @@ mod tests {
         check(DMat3::ZERO);
         check(DMat3::IDENTITY);
         let n = DVec3::new(1.0, -2.0, 0.5);
-        check(DMat3::from_cols(n * n.x, n * n.y, n * n.z));
-        check(DMat3::IDENTITY + 1e-12 * DMat3::from_cols(n * n.x, n * n.y, n * n.z));
-        check(1e-300 * DMat3::from_cols(n * n.x, n * n.y, n * n.z));
+        check(outer(n));
+        check(DMat3::IDENTITY + 1e-12 * outer(n));
+        check(1e-300 * outer(n));
     }
 
     #[test]

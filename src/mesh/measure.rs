@@ -3,6 +3,7 @@
 use super::TriangleMesh;
 use super::disjoint_sets::DisjointSets;
 use super::edge_table::{HalfEdge, by_edge, sorted_half_edges};
+use crate::math::symmetric::outer;
 use crate::math::{DMat3, DVec3};
 
 /// Geometric and topological measures of a mesh, in the length unit of its positions; the result of [`measure`].
@@ -132,10 +133,6 @@ fn solid(triangles: impl Iterator<Item = [DVec3; 3]>, reference: DVec3) -> Solid
     let cross = DMat3::from_cols(first * centre.x, first * centre.y, first * centre.z);
     let moments = second - cross - cross.transpose() + outer(centre) * volume;
     Solid { area, volume, centroid: reference + centre, moments }
-}
-
-fn outer(p: DVec3) -> DMat3 {
-    DMat3::from_cols(p * p.x, p * p.y, p * p.z)
 }
 
 struct Edges {

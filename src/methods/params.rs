@@ -4,7 +4,7 @@
 
 use super::{MethodError, ParamDefault, ParamKind, ParamSpec};
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Serialize};
 
 /// The parameters of a method. Implemented by the macro that declares them.
 pub trait Parameters: Clone + Default + PartialEq + Serialize + DeserializeOwned {
@@ -43,7 +43,8 @@ pub trait Parameters: Clone + Default + PartialEq + Serialize + DeserializeOwned
 }
 
 /// A value given for a parameter, before it is known whether it has the parameter's type.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(untagged)]
 pub enum ParamInput {
     /// A number, which an integer is given as, too.
     Number(f64),
@@ -117,85 +118,6 @@ impl ParamType for bool {
 
     fn as_default(&self) -> ParamDefault {
         ParamDefault::Boolean(*self)
-    }
-}
-
-/// A number, or the word `auto`: the method then chooses it from its data.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Auto {
-    /// Chosen by the method.
-    Auto,
-    /// Given by the caller.
-    Given(f64),
-}
-
-impl Auto {
-    /// Returns the number if it is given.
-    pub fn given(self) -> Option<f64> {
-        if let Self::Given(number) = self { Some(number) } else { None }
-    }
-}
-
-impl From<f64> for Auto {
-    fn from(number: f64) -> Self {
-        Self::Given(number)
-    }
-}
-
-choices! {
-    enum AutoWord {
-        Auto = "auto",
-    }
-}
-
-impl ParamType for Auto {
-    const KIND: ParamKind = ParamKind::Number;
-
-    const CHOICES: Option<&'static [&'static str]> = AutoWord::CHOICES;
-
-    fn from_input(value: &ParamInput) -> Option<Self> {
-        match AutoWord::from_input(value) {
-            Some(AutoWord::Auto) => Some(Self::Auto),
-            None => f64::from_input(value).map(Self::Given),
-        }
-    }
-
-    fn as_default(&self) -> ParamDefault {
-        self.given().map_or_else(|| AutoWord::Auto.as_default(), |number| number.as_default())
-    }
-
-    fn number(&self) -> Option<f64> {
-        self.given()
-    }
-}
-
-/// The form in which an [`Auto`] is serialised in human-readable formats. Binary states store a number, NaN for `auto`.
-#[derive(Serialize, Deserialize)]
-#[serde(untagged)]
-enum AutoInWords {
-    Word(AutoWord),
-    Number(f64),
-}
-
-impl Serialize for Auto {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        if !serializer.is_human_readable() {
-            return self.given().unwrap_or(f64::NAN).serialize(serializer);
-        }
-        self.given().map_or(AutoInWords::Word(AutoWord::Auto), AutoInWords::Number).serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for Auto {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        if !deserializer.is_human_readable() {
-            let number = f64::deserialize(deserializer)?;
-            return Ok(if number.is_nan() { Self::Auto } else { Self::Given(number) });
-        }
-        Ok(match AutoInWords::deserialize(deserializer)? {
-            AutoInWords::Word(AutoWord::Auto) => Self::Auto,
-            AutoInWords::Number(number) => Self::Given(number),
-        })
     }
 }
 
@@ -308,7 +230,103 @@ macro_rules! choices {
     };
 }
 
-pub(super) use {choices, parameters};
+/// Declares an enum of which a parameter is a value that is a number or a word, as [`choices!`] does; after the name comes
+/// its [`ParamKind`]. Saved states hold a number: after each word come the one that stands for it, and the test of one.
+macro_rules! words_or_number {
+    (
+        $(#[$attribute:meta])*
+        $visibility:vis enum $Type:ident: $kind:expr => {
+            $(#[$number_attribute:meta])*
+            Given,
+            $(
+                $(#[$variant_attribute:meta])*
+                $Variant:ident = $word:literal => ($code:expr, $is_code:expr),
+            )*
+        }
+    ) => {
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        $(#[$attribute])*
+        $visibility enum $Type {
+            $($(#[$variant_attribute])* $Variant,)*
+            $(#[$number_attribute])*
+            Given(f64),
+        }
+
+        impl $crate::methods::params::ParamType for $Type {
+            const KIND: $crate::methods::ParamKind = $kind;
+
+            const CHOICES: Option<&'static [&'static str]> = Some(&[$($word),*]);
+
+            fn from_input(value: &$crate::methods::ParamInput) -> Option<Self> {
+                match value {
+                    $($crate::methods::ParamInput::Word(word) if word == $word => Some(Self::$Variant),)*
+                    _ => <f64 as $crate::methods::params::ParamType>::from_input(value).map(Self::Given),
+                }
+            }
+
+            fn as_default(&self) -> $crate::methods::ParamDefault {
+                match self {
+                    $(Self::$Variant => $crate::methods::ParamDefault::Choice($word),)*
+                    Self::Given(number) => $crate::methods::params::ParamType::as_default(number),
+                }
+            }
+
+            fn number(&self) -> Option<f64> {
+                if let Self::Given(number) = self { Some(*number) } else { None }
+            }
+        }
+
+        impl serde::Serialize for $Type {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                match self {
+                    $(Self::$Variant if serializer.is_human_readable() => serializer.serialize_str($word),)*
+                    $(Self::$Variant => serializer.serialize_f64($code),)*
+                    Self::Given(number) => serializer.serialize_f64(*number),
+                }
+            }
+        }
+
+        impl<'de> serde::Deserialize<'de> for $Type {
+            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                if deserializer.is_human_readable() {
+                    let value = $crate::methods::ParamInput::deserialize(deserializer)?;
+                    let wrong = || serde::de::Error::custom("neither a number nor a word that is accepted");
+                    return $crate::methods::params::ParamType::from_input(&value).ok_or_else(wrong);
+                }
+                let number = f64::deserialize(deserializer)?;
+                $(if ($is_code)(number) {
+                    return Ok(Self::$Variant);
+                })*
+                Ok(Self::Given(number))
+            }
+        }
+    };
+}
+
+pub(super) use {choices, parameters, words_or_number};
+
+words_or_number! {
+    /// A number, or the word `auto`: the method then chooses it from its data.
+    pub enum Auto: ParamKind::Number => {
+        /// Given by the caller.
+        Given,
+        /// Chosen by the method.
+        Auto = "auto" => (f64::NAN, f64::is_nan),
+    }
+}
+
+impl Auto {
+    /// Returns the number if it is given.
+    pub fn given(self) -> Option<f64> {
+        self.number()
+    }
+}
+
+impl From<f64> for Auto {
+    fn from(number: f64) -> Self {
+        Self::Given(number)
+    }
+}
 
 #[cfg(test)]
 mod tests {

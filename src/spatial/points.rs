@@ -49,6 +49,11 @@ impl PointGrid {
         self.points.push(p);
     }
 
+    /// Returns the side of a cell.
+    pub fn cell(&self) -> f32 {
+        self.cell
+    }
+
     /// Returns all points, ordered by index.
     pub fn points(&self) -> &[Vec3] {
         &self.points

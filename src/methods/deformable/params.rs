@@ -1,9 +1,8 @@
 //! Parameters of the deformable model, with their ranges, labels and help texts.
 
-use crate::methods::params::{ParamType, choices, parameters};
-use crate::methods::{MethodError, ParamDefault, ParamInput, ParamKind, ParamScale, Parameters};
+use crate::methods::params::{choices, parameters, words_or_number};
+use crate::methods::{MethodError, ParamDefault, ParamKind, ParamScale, Parameters};
 use crate::volume::Volume;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 parameters! {
     /// The parameters of the deformable model. All can be changed while it runs.
@@ -177,15 +176,16 @@ parameters! {
 /// iterations; with 64, fronts that meet pass by openings before they settle.
 const IMPLICIT_STEP: f64 = 16.0;
 
-/// The rest length of the edges of the mesh, which act as springs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RestLength {
-    /// A rest length of 0: edges contract, and the surface tends to minimal area.
-    Zero,
-    /// The mean edge length of the mesh: edges tend to equal length.
-    Mean,
-    /// A given rest length in world units.
-    Given(f64),
+words_or_number! {
+    /// The rest length of the edges of the mesh, which act as springs.
+    pub enum RestLength: ParamKind::Choice => {
+        /// A given rest length in world units.
+        Given,
+        /// A rest length of 0: edges contract, and the surface tends to minimal area.
+        Zero = "zero" => (0.0, |code: f64| code == 0.0),
+        /// The mean edge length of the mesh: edges tend to equal length.
+        Mean = "mean" => (-1.0, |code: f64| code < 0.0),
+    }
 }
 
 choices! {
@@ -262,86 +262,5 @@ impl DeformableParams {
     /// [`MethodError::InvalidArgument`] with the name of the first parameter out of range and the accepted range.
     pub fn validate(&self) -> Result<(), MethodError> {
         self.check_ranges()
-    }
-}
-
-/// The form in which a [`RestLength`] is serialised in human-readable formats: a word or a length. Binary states store
-/// a single number instead.
-#[derive(Serialize, Deserialize)]
-#[serde(untagged)]
-enum RestLengthWords {
-    Word(RestWord),
-    Length(f64),
-}
-
-choices! {
-    enum RestWord {
-        Zero = "zero",
-        Mean = "mean",
-    }
-}
-
-impl ParamType for RestLength {
-    const KIND: ParamKind = ParamKind::Choice;
-
-    const CHOICES: Option<&'static [&'static str]> = RestWord::CHOICES;
-
-    fn from_input(value: &ParamInput) -> Option<Self> {
-        match RestWord::from_input(value) {
-            Some(RestWord::Zero) => Some(Self::Zero),
-            Some(RestWord::Mean) => Some(Self::Mean),
-            None => f64::from_input(value).map(Self::Given),
-        }
-    }
-
-    fn as_default(&self) -> ParamDefault {
-        match self {
-            Self::Zero => RestWord::Zero.as_default(),
-            Self::Mean => RestWord::Mean.as_default(),
-            Self::Given(length) => length.as_default(),
-        }
-    }
-
-    fn number(&self) -> Option<f64> {
-        if let Self::Given(length) = self { Some(*length) } else { None }
-    }
-}
-
-impl Serialize for RestLength {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        if !serializer.is_human_readable() {
-            let code = match self {
-                Self::Zero => 0.0,
-                Self::Mean => -1.0,
-                Self::Given(length) => *length,
-            };
-            return code.serialize(serializer);
-        }
-        match self {
-            Self::Zero => RestLengthWords::Word(RestWord::Zero),
-            Self::Mean => RestLengthWords::Word(RestWord::Mean),
-            Self::Given(length) => RestLengthWords::Length(*length),
-        }
-        .serialize(serializer)
-    }
-}
-
-impl<'de> Deserialize<'de> for RestLength {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        if !deserializer.is_human_readable() {
-            let code = f64::deserialize(deserializer)?;
-            return Ok(if code == 0.0 {
-                Self::Zero
-            } else if code < 0.0 {
-                Self::Mean
-            } else {
-                Self::Given(code)
-            });
-        }
-        Ok(match RestLengthWords::deserialize(deserializer)? {
-            RestLengthWords::Word(RestWord::Zero) => Self::Zero,
-            RestLengthWords::Word(RestWord::Mean) => Self::Mean,
-            RestLengthWords::Length(length) => Self::Given(length),
-        })
     }
 }

@@ -116,7 +116,7 @@ impl Cloud {
         let mean = self.points.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / self.len() as f64;
         let (spread, _) = symmetric::eigen(self.points.iter().fold(DMat3::ZERO, |sum, p| {
             let d = p.as_dvec3() - mean;
-            sum + DMat3::from_cols(d * d.x, d * d.y, d * d.z)
+            sum + symmetric::outer(d)
         }));
         if spread.x <= FLAT * FLAT * spread.z {
             return Err(MethodError::invalid("points", "all lie in one plane; they have to span a volume"));

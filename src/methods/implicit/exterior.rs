@@ -1,7 +1,7 @@
 //! Exterior points, known to be outside the surface, at which the implicit function f has to be −1: they fix which side
 //! of the input points is outside (Dinh, Turk & Slabaugh, section VI-A).
 
-use super::automatic::Sides;
+use super::automatic::OffSurface;
 use super::camera::Camera;
 use super::cloud::Cloud;
 use super::normals::{Normals, estimated_normals};
@@ -74,9 +74,9 @@ pub fn exterior_from_points(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
     Exterior { near: given, inside: Vec::new(), offset: 0.0, on_sphere: sphere_around(&cloud.points) }
 }
 
-/// Returns points on both sides of the surface with points on a sphere around `cloud`.
-pub fn exterior_from_sides(cloud: &Cloud, sides: Sides) -> Exterior {
-    let Sides { outside, inside, offset, .. } = sides;
+/// Returns points off the surface with points on a sphere around `cloud`.
+pub fn exterior_off_surface(cloud: &Cloud, found: OffSurface) -> Exterior {
+    let OffSurface { outside, inside, offset, .. } = found;
     Exterior { near: outside, inside, offset, on_sphere: sphere_around(&cloud.points) }
 }
 

@@ -36,17 +36,12 @@ pub enum Kernel {
     },
 }
 
-/// δ where none is given or chosen.
-const USUAL_DELTA: f64 = 5.0;
-
 impl Kernel {
-    /// Creates the kernel that `params` select, for constraints whose centres are in a ball of `radius`, in units of
-    /// the normalised box.
-    pub fn new(params: &ImplicitParams, radius: f64) -> Self {
+    /// Creates the kernel that `params` select, with `delta`, δ, as it is given or chosen, for constraints whose centres are
+    /// in a ball of `radius`, in units of the normalised box.
+    pub fn new(params: &ImplicitParams, delta: f64, radius: f64) -> Self {
         match params.kernel {
-            KernelKind::MultiOrder => {
-                Self::MultiOrder { delta: params.delta.given().unwrap_or(USUAL_DELTA), tau: params.tau }
-            }
+            KernelKind::MultiOrder => Self::MultiOrder { delta, tau: params.tau },
             KernelKind::ThinPlate => Self::ThinPlate { radius },
             KernelKind::Biharmonic => Self::Biharmonic { radius },
             KernelKind::Gaussian => Self::Gaussian { sigma: params.sigma },
@@ -603,7 +598,7 @@ mod tests {
 
     #[test]
     fn parameters_choose_the_kernel() {
-        let of = |kernel| Kernel::new(&ImplicitParams { kernel, ..ImplicitParams::default() }, 1.5);
+        let of = |kernel| Kernel::new(&ImplicitParams { kernel, ..ImplicitParams::default() }, 5.0, 1.5);
         assert_eq!(of(KernelKind::MultiOrder), multi(5.0, 0.025));
         assert_eq!(of(KernelKind::ThinPlate), Kernel::ThinPlate { radius: 1.5 });
         assert_eq!(of(KernelKind::Biharmonic), Kernel::Biharmonic { radius: 1.5 });

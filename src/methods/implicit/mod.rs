@@ -67,10 +67,10 @@ use crate::math::{DAffine3, DVec3, PositionIndex, Vec3};
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::remesh::Changes;
 use crate::warning::{Warning, WarningCode};
-use automatic::Placing;
+use automatic::OffSurfaceSearch;
 use cloud::{BoxMap, MAX_POINTS, MIN_POINTS};
 use color::Coloring;
-use exterior::{Exterior, exterior_from_points, exterior_from_sides, generate_exterior};
+use exterior::{Exterior, exterior_from_points, exterior_off_surface, generate_exterior};
 use extract::{Extraction, default_cell};
 use field::Field;
 use kernel::{Kernel, KernelTable};
@@ -129,11 +129,9 @@ pub struct ImplicitSurface {
     params: ImplicitParams,
     edits: PointEdits,
     samples: Option<Samples>,
-    /// Measures of the samples, and the values chosen by them; `None` before they are selected.
-    choice: Option<Choice>,
     exterior: Option<Exterior>,
-    /// Whether inside and outside may be confused; see [`Sides::are_doubtful`](automatic::Sides::are_doubtful).
-    doubtful_sides: bool,
+    /// Whether inside and outside are ambiguous; see [`OffSurface::is_ambiguous`](automatic::OffSurface::is_ambiguous).
+    ambiguous_sides: bool,
     /// The current constraints on the implicit function, made from samples, exterior points and edits.
     constraints: Constraints,
     stage: Stage,
@@ -186,8 +184,8 @@ impl Solved {
 /// The stage of the reconstruction that the next call of [`ImplicitSurface::step`] works on, with its data.
 enum Stage {
     Subsample(Box<Sampling>),
-    /// The search for points on both sides of the surface; `None` before it, or without one.
-    Constrain(Option<Box<Placing>>),
+    /// The search for points off the surface; `None` before it, or without one.
+    Constrain(Option<Box<OffSurfaceSearch>>),
     Solve(Box<Solver>),
     Extract(Box<Extraction>),
     Color(Box<ColoringState>),
@@ -256,9 +254,8 @@ impl ImplicitSurface {
             params: options.params.clone(),
             edits: PointEdits::default(),
             samples: None,
-            choice: None,
             exterior: None,
-            doubtful_sides: false,
+            ambiguous_sides: false,
             constraints: Constraints::default(),
             stage: first_stage(&options),
             options,
@@ -310,7 +307,7 @@ impl ImplicitSurface {
         let (before, slices) = (stage.phase(), std::mem::take(&mut self.slices));
         self.stage = match stage {
             Stage::Subsample(sampling) => self.subsample(sampling)?,
-            Stage::Constrain(placing) => self.constrain(placing)?,
+            Stage::Constrain(search) => self.constrain(search)?,
             Stage::Solve(solver) => self.solve(solver)?,
             Stage::Extract(extraction) => self.extract(extraction)?,
             Stage::Color(state) => self.color(*state),
@@ -341,9 +338,9 @@ impl ImplicitSurface {
     }
 
     fn warnings(&self) -> Vec<Warning> {
-        let text = "the points hardly tell inside from outside: walls or gaps are about as thin as the points are apart or \
-                    scattered; components, handles and volume may be wrong";
-        if self.doubtful_sides && self.has_sides() {
+        let text = "inside and outside are ambiguous: walls or gaps are about as thin as the spacing of the points or their \
+                    noise; components, handles and volume may be wrong";
+        if self.ambiguous_sides && self.is_two_sided() {
             vec![Warning::new(WarningCode::ThinParts, text)]
         } else {
             Vec::new()
@@ -352,32 +349,46 @@ impl ImplicitSurface {
 
     fn subsample(&mut self, mut sampling: Box<Sampling>) -> Result<Stage, MethodError> {
         self.samples = sampling.advance(&self.cloud)?;
-        self.choice = self.samples.as_ref().map(|samples| Choice::of(&samples.cloud.points, samples.spacing));
         Ok(if self.samples.is_some() { Stage::Constrain(None) } else { Stage::Subsample(sampling) })
     }
 
-    /// Makes the constraints, those on both sides in slices.
-    fn constrain(&mut self, placing: Option<Box<Placing>>) -> Result<Stage, MethodError> {
-        let (Some(samples), Some(choice)) = (&self.samples, self.choice) else {
-            return Ok(first_stage(&self.options));
-        };
-        if !self.has_sides() {
-            self.exterior = Some(self.exterior_points(samples));
-        } else if let Some(mut placing) = placing {
-            let Some(sides) = placing.advance() else { return Ok(Stage::Constrain(Some(placing))) };
-            self.doubtful_sides = sides.are_doubtful();
-            self.exterior = Some(exterior_from_sides(&samples.cloud, sides));
-        } else {
-            let placing = Placing::new(&samples.cloud, choice, samples.spacing, SEED);
-            return Ok(Stage::Constrain(Some(Box::new(placing))));
-        }
-        self.combine()?;
-        Ok(self.begin_solve())
+    /// Makes the constraints, of which those off the surface take several slices.
+    fn constrain(&mut self, search: Option<Box<OffSurfaceSearch>>) -> Result<Stage, MethodError> {
+        Ok(match self.make_constraints(search)? {
+            None if self.exterior.is_none() => first_stage(&self.options),
+            None => self.begin_solve(),
+            unfinished => Stage::Constrain(unfinished),
+        })
     }
 
-    /// Whether there are constraints on both sides of the surface: if the caller leaves that open, and knows no other
-    /// way to tell the sides.
-    fn has_sides(&self) -> bool {
+    /// Does a slice of making the exterior points and, at the end, the constraints on the implicit function from these, the
+    /// samples and the edits; returns the search if it is unfinished. Does nothing before the samples are selected.
+    fn make_constraints(
+        &mut self,
+        search: Option<Box<OffSurfaceSearch>>,
+    ) -> Result<Option<Box<OffSurfaceSearch>>, MethodError> {
+        let Some(samples) = &self.samples else { return Ok(None) };
+        let exterior = match search {
+            _ if !self.is_two_sided() => self.exterior_points(samples),
+            None => {
+                let search = OffSurfaceSearch::new(samples, SEED);
+                return Ok(Some(Box::new(search)));
+            }
+            Some(mut search) => {
+                let Some(found) = search.advance() else { return Ok(Some(search)) };
+                self.ambiguous_sides = found.is_ambiguous();
+                exterior_off_surface(&samples.cloud, found)
+            }
+        };
+        let constraints = self.edits.constraints(samples, &exterior, &self.original, &self.map)?;
+        self.constraints = self.regularized(constraints);
+        self.exterior = Some(exterior);
+        Ok(None)
+    }
+
+    /// Whether there are constraints on both sides of the surface: if the caller leaves that open, and gives no exterior
+    /// points or cameras.
+    fn is_two_sided(&self) -> bool {
         let is_open = self.options.exterior.is_none() && self.options.cameras.is_empty();
         self.params.lambda_exterior == Auto::Auto && is_open
     }
@@ -397,31 +408,35 @@ impl ImplicitSurface {
         }
     }
 
-    /// Builds the constraints on the implicit function from samples, exterior points and edits; does nothing before
-    /// these are known.
-    fn combine(&mut self) -> Result<(), MethodError> {
-        let (Some(samples), Some(exterior)) = (&self.samples, &self.exterior) else { return Ok(()) };
-        let constraints = self.edits.constraints(samples, exterior, &self.original, &self.map)?;
-        self.constraints = self.regularized(constraints);
-        Ok(())
-    }
-
-    /// Returns the parameters with those that are `auto` as they were chosen, once they are.
-    pub fn settled(&self) -> ImplicitParams {
-        self.choice.map_or_else(|| self.params.clone(), |choice| self.params.settled(&choice))
-    }
-
-    /// Returns what was measured on the sampled points, and chosen from that for parameters that are `auto`; `None` before
+    /// Returns measures of the sampled points, and the values chosen by them for parameters that are `auto`; `None` before
     /// they are sampled.
     pub fn choice(&self) -> Option<&Choice> {
-        self.choice.as_ref()
+        self.samples.as_ref().map(|samples| &samples.choice)
+    }
+
+    /// Returns the values in force: those given, or else those chosen; 0 before the samples are selected, when nothing is
+    /// made with them.
+    fn in_force(&self) -> Choice {
+        let chosen = self.choice().copied().unwrap_or_default();
+        let ImplicitParams { delta, lambda_surface, lambda_exterior, .. } = self.params;
+        Choice {
+            delta: delta.given().unwrap_or(chosen.delta),
+            lambda_surface: lambda_surface.given().unwrap_or(chosen.lambda_surface),
+            lambda_exterior: lambda_exterior.given().unwrap_or(chosen.lambda_exterior),
+            ..chosen
+        }
+    }
+
+    fn kernel(&self, constraints: &Constraints) -> Kernel {
+        Kernel::new(&self.params, self.in_force().delta, constraints.radius())
     }
 
     fn regularized(&self, mut constraints: Constraints) -> Constraints {
-        let (given, settled) = (self.params.lambda_surface.given(), self.settled());
-        let chosen = settled.lambda_surface.given().unwrap_or_default();
-        let surface = given.map_or(chosen, |lambda| constraints.crowded(lambda));
-        constraints.regularize(surface, settled.lambda_exterior.given().unwrap_or_default());
+        let Choice { lambda_surface, lambda_exterior, .. } = self.in_force();
+        // Those that are chosen are for this number of points.
+        let is_chosen = self.params.lambda_surface == Auto::Auto;
+        let surface = if is_chosen { lambda_surface } else { constraints.crowded(lambda_surface) };
+        constraints.regularize(surface, lambda_exterior);
         constraints
     }
 
@@ -434,8 +449,7 @@ impl ImplicitSurface {
     }
 
     fn new_solver(&self, constraints: &Constraints) -> Box<Solver> {
-        let kernel = Kernel::new(&self.settled(), constraints.radius());
-        Box::new(Solver::new(constraints, kernel, self.params.tolerance, SEED))
+        Box::new(Solver::new(constraints, self.kernel(constraints), self.params.tolerance, SEED))
     }
 
     /// Starts to solve the linear system of the current constraints after an edit: by revising the system of the last
@@ -450,8 +464,7 @@ impl ImplicitSurface {
             Some(kept) => kept,
             None => self.new_solver(&self.base_constraints()?),
         };
-        let kernel = Kernel::new(&self.settled(), self.constraints.radius());
-        let is_usable = solver.kernel() == kernel
+        let is_usable = solver.kernel() == self.kernel(&self.constraints)
             && solver.revise(&self.constraints, solved.weights_at(&self.constraints));
         is_usable.then_some(solver)
     }
@@ -493,7 +506,7 @@ impl ImplicitSurface {
         let points = self.in_world(&self.constraints.centres[..self.constraints.surface]);
         let level = self.iso_value(solved);
         let extraction =
-            Extraction::new(&solved.field, self.map, level, &points, self.cell(), !self.has_sides())?;
+            Extraction::new(&solved.field, self.map, level, &points, self.cell(), !self.is_two_sided())?;
         Ok(Stage::Extract(Box::new(extraction)))
     }
 
@@ -577,9 +590,11 @@ impl ImplicitSurface {
         let (now, only_extraction) = (&self.params, before.with_extraction_of(&self.params));
         let other_sides = (before.lambda_exterior == Auto::Auto) != (now.lambda_exterior == Auto::Auto);
         if other_sides && !matches!(self.stage, Stage::Subsample(_)) {
+            // Without them, edits in the meantime wait for the new ones.
+            self.exterior = None;
             (self.stage, self.slices) = (Stage::Constrain(None), 0);
         }
-        if before == *now || matches!(self.stage, Stage::Subsample(_) | Stage::Constrain(None)) {
+        if before == *now || matches!(self.stage, Stage::Subsample(_) | Stage::Constrain(_)) {
             return Ok(());
         }
         if only_extraction == *now && !matches!(self.stage, Stage::Solve(_)) {
@@ -697,7 +712,7 @@ impl Stage {
     fn progress(&self, cameras: usize) -> f64 {
         match self {
             Self::Subsample(sampling) => sampling.progress(),
-            Self::Constrain(placing) => placing.as_ref().map_or(0.0, |placing| placing.progress()),
+            Self::Constrain(search) => search.as_ref().map_or(0.0, |search| search.progress()),
             Self::Solve(solver) => solver.progress(),
             Self::Extract(extraction) => extraction.progress(),
             Self::Color(state) => state.camera as f64 / (cameras + 1) as f64,

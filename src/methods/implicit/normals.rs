@@ -73,11 +73,11 @@ impl Plane {
             let d = (grid.points()[i as usize] - p).as_dvec3();
             count += 1.0;
             sum += d;
-            squares += DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+            squares += symmetric::outer(d);
             true
         });
         let mean = sum / count;
-        let spread = squares * (1.0 / count) - DMat3::from_cols(mean * mean.x, mean * mean.y, mean * mean.z);
+        let spread = squares * (1.0 / count) - symmetric::outer(mean);
         let (values, vectors) = symmetric::eigen(spread);
         let deviation = |x: f64| if x > 0.0 { x.sqrt() } else { 0.0 };
         Self { normal: vectors.x_axis.as_vec3(), thickness: deviation(values.x), width: deviation(values.y) }

@@ -1,6 +1,5 @@
 //! Parameters of the implicit surface, with their ranges, labels and help texts.
 
-use super::automatic::Choice;
 use crate::methods::params::{Auto, choices, parameters};
 use crate::methods::{MethodError, ParamScale, Parameters};
 
@@ -136,17 +135,6 @@ impl ImplicitParams {
     /// used to find out whether a change of parameters needs a new solve.
     pub fn with_extraction_of(&self, other: &Self) -> Self {
         Self { cell: other.cell, level: other.level, ..self.clone() }
-    }
-
-    /// Returns these parameters with those that are [`Auto::Auto`] as they were chosen.
-    pub fn settled(&self, choice: &Choice) -> Self {
-        let settled = |value: Auto, chosen: f64| Auto::Given(value.given().unwrap_or(chosen));
-        Self {
-            delta: settled(self.delta, choice.delta),
-            lambda_surface: settled(self.lambda_surface, choice.lambda_surface),
-            lambda_exterior: settled(self.lambda_exterior, choice.lambda_exterior),
-            ..self.clone()
-        }
     }
 
     /// Returns a warning, to be shown to the user, if δ of the multi-order kernel is so large that the surface may

@@ -1,6 +1,7 @@
 //! Selection of the input points that become surface constraints, by Poisson-disc sampling in slices of about ten
 //! milliseconds of work (Dinh, Turk & Slabaugh, section VI-B).
 
+use super::automatic::Choice;
 use super::cloud::{Cloud, largest_clusters, mean_spacing};
 use crate::math::{Random, Vec3};
 use crate::methods::MethodError;
@@ -26,6 +27,8 @@ pub struct Samples {
     /// Mean distance of a selected point from its nearest neighbour, estimated from at most 4000 samples, in units of
     /// the normalised box (longest side 2).
     pub spacing: f64,
+    /// Measures of the selected points, and the values chosen by them.
+    pub choice: Choice,
 }
 
 /// Selection of the points of a cloud that become surface constraints, in slices of about ten milliseconds of work.
@@ -63,7 +66,8 @@ impl Sampling {
         let Some(chosen) = poisson_disc.advance(&kept.points, SLICE) else { return Ok(None) };
         let cloud = kept.select(&chosen);
         cloud.check_span()?;
-        Ok(Some(Samples { spacing: mean_spacing(&cloud.points), cloud }))
+        let spacing = mean_spacing(&cloud.points);
+        Ok(Some(Samples { spacing, choice: Choice::of(&cloud.points, spacing), cloud }))
     }
 
     fn largest(cloud: &Cloud, keep: usize) -> Result<Cloud, MethodError> {

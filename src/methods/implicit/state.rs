@@ -178,12 +178,10 @@ impl ImplicitSurface {
             self.advance()?;
         }
         if !matches!(saved_stage, SavedStage::Subsample | SavedStage::Constrain) {
-            // Leaves them as at the last full solve.
-            let base = self.base_edits.take();
-            while matches!(self.stage, Stage::Constrain(_)) {
-                self.advance()?;
+            let mut search = self.make_constraints(None)?;
+            while search.is_some() {
+                search = self.make_constraints(search)?;
             }
-            self.base_edits = base;
         }
         self.stage = match saved_stage {
             SavedStage::Solve(position, revised) => {

@@ -19,8 +19,8 @@ use crate::methods::MethodError;
 use crate::methods::slices::Pauses;
 use crate::volume::VolumeError;
 
-/// Largest number of cells through which surfaces pass; more would take more than a gigabyte. Labels of noise have as many
-/// in 200³ voxels, those of anatomy in 1000³.
+/// Largest number of cells through which surfaces pass; more take more than a gigabyte. Labels of noise have as many in 200³
+/// voxels.
 const MOST_CELLS: usize = 8_000_000;
 /// Work that a layer of voxels counts as, whatever is in it.
 const LAYER_WORK: usize = 50;

@@ -54,7 +54,7 @@ export class EditPanel {
   #from: SurfacePoint | undefined;
   #enabled = false;
   #unfolded = false;
-  /** Number of works in progress, and of those during which no other may begin. */
+  /** Number of tasks in progress, and of those during which no other may begin. */
   #working = 0;
   #blocking = 0;
 
@@ -149,7 +149,8 @@ export class EditPanel {
       ],
       () => void this.#preview(),
     );
-    const edit = (name: string, label: string, make: () => Edit) => this.#button(name, label, () => this.#edit(make));
+    const edit = (name: string, label: string, make: () => Edit) =>
+      this.#button(name, label, () => this.#change('edit', make));
     const keep = (indices: number[]): Edit => ({ op: 'keepComponents', indices });
     return [
       group(text('finish.sampling'), this.#decimationForm.element, [
@@ -226,11 +227,7 @@ export class EditPanel {
     this.#measuring.disabled = !idle;
   }
 
-  /** Makes an edit; `make` is called when the surface is open, as most edits depend on it. */
-  #edit(make: () => Edit): Promise<void> {
-    return this.#change('edit', make);
-  }
-
+  /** Changes the surface; `make` is called when it is open, as most edits depend on it. */
   async #change(kind: 'edit' | 'undo' | 'redo', make: () => Edit | undefined = () => undefined): Promise<void> {
     await this.#attempt(async () => {
       await this.#finishing.open();
@@ -242,8 +239,8 @@ export class EditPanel {
   }
 
   /**
-   * Does some work, and no other meanwhile unless it is not `blocking`; an error is shown, and nothing else changes.
-   * Returns whether it was done.
+   * Does some work; controls are disabled meanwhile if it is `blocking`. An error is shown, and nothing else changes.
+   * Returns whether the work was done.
    */
   async #attempt(work: () => Promise<unknown>, blocking = true): Promise<boolean> {
     this.#error.textContent = '';
@@ -261,9 +258,10 @@ export class EditPanel {
       return false;
     } finally {
       this.#count(-1, blocking);
-      // Buttons lose the focus when they are disabled, as Cancel is now.
-      const isLost = document.activeElement === document.body || document.activeElement === this.#cancel;
-      if (isLost && focused instanceof HTMLElement) focused.focus();
+      // Buttons lose the focus when they are disabled, as Cancel is now; it comes back when they are enabled.
+      const { activeElement } = document;
+      const isLost = activeElement === document.body || activeElement === this.#cancel;
+      if (isLost && this.#blocking === 0 && focused instanceof HTMLElement) focused.focus();
     }
   }
 

@@ -35,9 +35,9 @@ export class TrackResults {
   #frame = 0;
   /** Whether the user has chosen the displayed frame, so that newly tracked frames do not replace it. */
   #frameChosen = false;
-  /** The frame that is displayed next, and the timer for that. */
+  /** The frame that is displayed at the next animation frame, if one is pending. */
   #next = 0;
-  #drawing: ReturnType<typeof setTimeout> | undefined;
+  #framePending = 0;
   #votes: BoundaryVotes | undefined;
   #between: { key: string; between: InterpolatedSlice } | undefined;
   /** Kinds of data requests ('votes', 'between') that the worker has not answered yet. */
@@ -144,18 +144,17 @@ export class TrackResults {
     const newest = index ?? Math.min(report.iteration, count) - 1;
     const isSame = this.#frameChosen || (index === undefined && this.#frames.length > 0);
     this.#next = isSame ? this.#frame : newest;
-    // Small frames are tracked faster than drawn: only the newest of those that have arrived is.
-    this.#drawing ??= setTimeout(() => this.catchUp(), 0);
+    // Small frames are tracked faster than drawn: of those that have arrived, only the newest is.
+    this.#framePending ||= requestAnimationFrame(() => this.showPending());
   }
 
-  /** Ends all that is yet to be displayed, when the lab is closed. */
   close(): void {
-    clearTimeout(this.#drawing);
+    cancelAnimationFrame(this.#framePending);
   }
 
-  /** Displays the frame that was taken last, if that is yet to be done. */
-  catchUp(): void {
-    if (this.#drawing !== undefined) this.show(this.#next);
+  /** Displays the frame that is pending, if one is. */
+  showPending(): void {
+    if (this.#framePending) this.show(this.#next);
   }
 
   /** Displays a frame chosen by the user, and stays at it while others are tracked. */
@@ -166,8 +165,8 @@ export class TrackResults {
 
   /** Displays a frame with its surface and measures, and updates all that depends on the displayed frame. */
   show(frame: number): void {
-    clearTimeout(this.#drawing);
-    this.#drawing = undefined;
+    cancelAnimationFrame(this.#framePending);
+    this.#framePending = 0;
     const { view, frames: bar, measures } = this.#ui;
     const count = this.#image?.volume.frames ?? 1;
     const shown = Math.min(frame, count - 1);

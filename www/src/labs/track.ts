@@ -258,8 +258,8 @@ export class TrackLab extends RunLab<TrackExample> {
   }
 
   #onEvent(event: WorkerEvent): void {
-    // A state is that of the frames that are displayed.
-    if (event.event === 'state') this.#results.catchUp();
+    // A new state is displayed after the frames before it.
+    if (event.event === 'state') this.#results.showPending();
     if (this.takes(event)) return;
     if (event.event === 'preparing') this.ui.status.say(event.what);
     else if (event.event === 'comparing') this.ui.compare.showProgress(event.part, event.phase);

@@ -4,17 +4,15 @@
 //! Points outside alone, as in the paper, hold f near −1 on one side and leave it flat on the other: where noise needs a
 //! large λ, the surface recedes. Pairs of points on both sides give f a slope.
 
-mod quadrics;
-mod sides;
+mod off_surface;
+mod quadric_fit;
 mod winding;
 
-pub use sides::{Placing, Sides};
-
-use crate::math::{Vec3, lower};
+pub use off_surface::{OffSurface, OffSurfaceSearch};
 
 use crate::math::order::median;
-use crate::spatial::PointGrid;
-use quadrics::Quadric;
+use crate::math::{Vec3, lower};
+use quadric_fit::{QuadricFit, fitting_grid};
 use serde::Serialize;
 use std::f64::consts::PI;
 
@@ -31,7 +29,7 @@ const SPARSE_POINTS: usize = 200;
 const SPARSE_LENGTH: f64 = 0.1;
 /// Length that λ damps: a share of the distance between points, and one of the noise.
 const LENGTH: [f64; 2] = [0.5, 0.5];
-/// λ of constraints beside the surface, relative to that of those on it, and the largest. They are soft, so that wrong ones
+/// λ of constraints off the surface, relative to that of those on it, and the largest. They are soft, so that wrong ones
 /// yield.
 const SOFTNESS: [f64; 2] = [300.0, 2.0];
 /// δ for each point along a unit of length, and the largest: with more, gaps between few points are not closed.
@@ -39,7 +37,7 @@ const SMOOTHNESS: [f64; 2] = [0.3, 5.0];
 
 /// Measures of the points of an implicit surface, and the values chosen by them for parameters that are `auto`; in units of
 /// the normalised box, in which the longest side of the points' bounding box is 2.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Choice {
     /// Estimated noise of the points: their standard deviation from the surface along its normal; 0 for fewer than a hundred
@@ -49,7 +47,7 @@ pub struct Choice {
     pub density: f64,
     /// λ of constraints on the surface.
     pub lambda_surface: f64,
-    /// λ of constraints on both sides of it.
+    /// λ of constraints off it.
     pub lambda_exterior: f64,
     /// First-order smoothness δ.
     pub delta: f64,
@@ -58,14 +56,13 @@ pub struct Choice {
 impl Choice {
     /// Measures points whose mean distance to the nearest neighbour is `spacing`, and chooses.
     pub fn of(points: &[Vec3], spacing: f64) -> Self {
-        let radius = NEIGHBOURS[1] as f32 * spacing as f32 * 0.25;
-        let grid = PointGrid::of(points, radius);
+        let grid = fitting_grid(points, spacing);
         let step = points.len().div_ceil(TRIALS);
         let [wide, narrow] = NEIGHBOURS.map(|count| {
             let some = points.iter().step_by(step);
-            some.filter_map(|&p| Quadric::around(&grid, p, count, radius)).collect::<Vec<_>>()
+            some.filter_map(|&p| QuadricFit::around(&grid, p, count)).collect::<Vec<_>>()
         });
-        let deviation = |fits: &[Quadric]| median(fits.iter().map(|fit| fit.deviation)).unwrap_or(0.0);
+        let deviation = |fits: &[QuadricFit]| median(fits.iter().map(|fit| fit.deviation)).unwrap_or(0.0);
         let noise = if points.len() < FEW_POINTS { 0.0 } else { lower(deviation(&wide), deviation(&narrow)) };
         let reach = f64::from(median(wide.iter().map(|fit| fit.radius)).unwrap_or(2.0));
         let within = NEIGHBOURS[0].min(points.len()) as f64;

@@ -2,11 +2,11 @@
 //! outside and ½ at the surface, and falls along the normal (Lin, Shi & Liu, *Fast and globally consistent normal
 //! orientation based on the winding number normal consistency*, 2024).
 
-use crate::math::order::sort_by_rank;
+use crate::math::order::{sort_by_rank, sort_distinct};
 use crate::math::{DVec3, Vec3};
 use std::f64::consts::PI;
 
-/// Largest number of parts that are turned around.
+/// Largest number of parts that are flipped.
 const MOST_PARTS: usize = 64;
 
 /// The winding number of a surface that is known at some positions: a sum over vectors, the normals there, each as long as
@@ -30,60 +30,62 @@ impl Winding {
     }
 
     /// Makes the vectors more consistent: a step of steepest descent of the squared differences of the winding number from
-    /// ½, after which each vector is turned to where the winding number falls. Distances are smoothed below `width`. Takes
+    /// ½, after which each vector is turned along the negative gradient of the winding number. Distances are smoothed below `width`. Takes
     /// time in proportion to the square of the number of positions.
     pub fn improve(&mut self, width: f64) {
         self.smoothing = width * width;
-        let errors: Vec<f64> = self.positions.iter().map(|&x| 0.5 - self.sum(x, &self.vectors)).collect();
+        let errors: Vec<f64> =
+            self.positions.iter().map(|&x| 0.5 - self.sum(x, self.with(&self.vectors))).collect();
         let direction: Vec<DVec3> = self.positions.iter().map(|&x| self.transposed(x, &errors)).collect();
-        let change: Vec<f64> = self.positions.iter().map(|&x| self.sum(x, &direction)).collect();
+        let change: Vec<f64> = self.positions.iter().map(|&x| self.sum(x, self.with(&direction))).collect();
         let squared: f64 = change.iter().map(|c| c * c).sum();
         if squared > 0.0 {
             let step = direction.iter().map(|d| d.length_squared()).sum::<f64>() / squared;
             self.vectors.iter_mut().zip(&direction).for_each(|(v, d)| *v += *d * step);
         }
-        let falls: Vec<DVec3> = self.positions.iter().map(|&x| self.fall(x)).collect();
-        self.vectors.iter_mut().zip(falls).for_each(|(v, fall)| *v = fall.normalize_or_zero() * v.length());
+        let outwards: Vec<DVec3> = self.positions.iter().map(|&x| self.negative_gradient(x)).collect();
+        self.vectors.iter_mut().zip(outwards).for_each(|(v, n)| *v = n.normalize_or_zero() * v.length());
     }
 
-    /// Turns whole `parts` around, given as indices of the positions, as long as that brings the winding number at all positions
-    /// nearer to ½. Within a part, vectors are consistent already; those of a cavity have to point into it.
-    pub fn turn_parts(&mut self, parts: &[Vec<u32>]) {
-        let mut largest: Vec<&Vec<u32>> = parts.iter().collect();
-        sort_by_rank(&mut largest, |part| u64::MAX - part.len() as u64);
-        largest.truncate(MOST_PARTS);
-        let of_part = |part: &&Vec<u32>| {
-            let mut alone = vec![DVec3::ZERO; self.vectors.len()];
-            part.iter().for_each(|&i| alone[i as usize] = self.vectors[i as usize]);
-            self.positions.iter().map(|&x| self.sum(x, &alone)).collect()
+    /// Flips all vectors of one of `parts`, given as indices of the positions, as long as that brings the winding number at
+    /// all positions nearer to ½. Within a part, vectors are consistent already; those of a cavity have to point into it.
+    pub fn flip_parts(&mut self, parts: &[Vec<u32>]) {
+        if parts.is_empty() {
+            return;
+        }
+        let mut by_size: Vec<&Vec<u32>> = parts.iter().collect();
+        sort_by_rank(&mut by_size, |part| u64::MAX - part.len() as u64);
+        let mut largest: Vec<Vec<u32>> = by_size.into_iter().take(MOST_PARTS).cloned().collect();
+        largest.iter_mut().for_each(sort_distinct);
+        let of_part = |part: &Vec<u32>| -> Vec<f64> {
+            let own = || part.iter().map(|&i| (self.positions[i as usize], self.vectors[i as usize]));
+            self.positions.iter().map(|&x| self.sum(x, own())).collect()
         };
-        let found: Vec<Vec<f64>> = largest.iter().map(of_part).collect();
-        let mut errors: Vec<f64> = self.positions.iter().map(|&x| self.sum(x, &self.vectors) - 0.5).collect();
-        let mut signs = vec![1.0; largest.len()];
+        let mut found: Vec<Vec<f64>> = largest.iter().map(of_part).collect();
+        let mut errors: Vec<f64> =
+            self.positions.iter().map(|&x| self.sum(x, self.with(&self.vectors)) - 0.5).collect();
         for _ in 0..MOST_PARTS {
-            // The change of the sum of squared errors by a turn of each part.
-            let change = |k: usize| {
-                let turned = errors
-                    .iter()
-                    .zip(&found[k])
-                    .map(|(error, own)| own * signs[k] * (own * signs[k] - error));
-                4.0 * turned.sum::<f64>()
+            // The change of the sum of squared errors by a flip of a part.
+            let change = |own: &Vec<f64>| {
+                4.0 * errors.iter().zip(own).map(|(error, own)| own * (own - error)).sum::<f64>()
             };
-            let changes: Vec<f64> = (0..largest.len()).map(change).collect();
+            let changes: Vec<f64> = found.iter().map(change).collect();
             let best =
-                (0..largest.len()).fold(0, |best, k| if changes[k] < changes[best] { k } else { best });
+                (0..changes.len()).fold(0, |best, k| if changes[k] < changes[best] { k } else { best });
             if changes.get(best).is_none_or(|&change| change >= 0.0) {
                 break;
             }
-            errors.iter_mut().zip(&found[best]).for_each(|(error, own)| *error -= 2.0 * signs[best] * own);
-            signs[best] = -signs[best];
+            errors.iter_mut().zip(&mut found[best]).for_each(|(error, own)| {
+                *error -= 2.0 * *own;
+                *own = -*own;
+            });
             largest[best].iter().for_each(|&i| self.vectors[i as usize] = -self.vectors[i as usize]);
         }
     }
 
     /// Returns the winding number at `x`.
     pub fn at(&self, x: Vec3) -> f64 {
-        self.sum(x.as_dvec3(), &self.vectors)
+        self.sum(x.as_dvec3(), self.with(&self.vectors))
     }
 
     /// Returns the vector at each position.
@@ -91,10 +93,14 @@ impl Winding {
         &self.vectors
     }
 
-    /// Returns the winding number at `x` that other vectors at the positions define.
-    fn sum(&self, x: DVec3, vectors: &[DVec3]) -> f64 {
-        let terms = self.positions.iter().zip(vectors).map(|(p, v)| v.dot(self.influence(*p - x)));
-        terms.sum::<f64>() / (4.0 * PI)
+    /// Returns the positions with other vectors.
+    fn with<'a>(&'a self, vectors: &'a [DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> + 'a {
+        self.positions.iter().copied().zip(vectors.iter().copied())
+    }
+
+    /// Returns the winding number at `x` that some positions with their vectors define.
+    fn sum(&self, x: DVec3, some: impl Iterator<Item = (DVec3, DVec3)>) -> f64 {
+        some.map(|(p, v)| v.dot(self.influence(p - x))).sum::<f64>() / (4.0 * PI)
     }
 
     /// Returns, of the product of `values` at the positions with the transposed matrix of [`Self::sum`], the entry at `x`.
@@ -108,9 +114,9 @@ impl Winding {
         offset / (squared * squared.sqrt())
     }
 
-    /// Returns the direction in which the winding number falls at a position: its negative gradient, but for the part of
-    /// the vector there, which would fall along itself on either side.
-    fn fall(&self, x: DVec3) -> DVec3 {
+    /// Returns the negative gradient of the winding number at a position, times 4π, without the term of the vector there,
+    /// which points along itself, whichever its side.
+    fn negative_gradient(&self, x: DVec3) -> DVec3 {
         let others = self.positions.iter().zip(&self.vectors).filter(|&(p, _)| *p != x);
         let terms = others.map(|(p, v)| {
             let offset = *p - x;

@@ -3,7 +3,7 @@
 //! & Owhadi, *Sparse Cholesky factorization by Kullback–Leibler minimization*, 2021).
 
 use crate::math::order::{rank_f64, select_least, sort_pairs};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Vec3, cholesky};
 use crate::methods::implicit::kernel::KernelTable;
 use crate::spatial::PointGrid;
 
@@ -165,59 +165,15 @@ fn row(
         }
         factor[i * n + i] = own + lambda[p as usize];
     }
-    cholesky(&mut factor, n);
+    cholesky::factorise(&mut factor, n);
     // b becomes L⁻¹b, whose squares sum to bᵀA⁻¹b, and then A⁻¹b.
-    forward(&factor, &mut b);
+    cholesky::forward(&factor, &mut b);
     let diagonal = own + lambda[centre];
     let variance = diagonal - b.iter().map(|x| x * x).sum::<f64>();
-    backward(&factor, &mut b);
-    let scale = 1.0 / max(variance, MIN_PIVOT * diagonal).sqrt();
+    cholesky::backward(&factor, &mut b);
+    let scale = 1.0 / cholesky::max(variance, cholesky::MIN_PIVOT * diagonal).sqrt();
     out.push(scale);
     out.extend(b.iter().map(|x| -x * scale));
-}
-
-/// Smallest pivot of a Cholesky factorisation, as a share of the matrix's diagonal entry: a lower pivot is due to
-/// rounding, and is raised to this.
-const MIN_PIVOT: f64 = 1e-12;
-
-/// Replaces the lower triangle of a symmetric positive definite `n` by `n` matrix by its Cholesky factor; pivots are at
-/// least [`MIN_PIVOT`] of their diagonal entry.
-fn cholesky(a: &mut [f64], n: usize) {
-    for i in 0..n {
-        let (done, rest) = a.split_at_mut(i * n);
-        let row = &mut rest[..=i];
-        for j in 0..i {
-            let other = &done[j * n..j * n + j + 1];
-            let sum: f64 = row[..j].iter().zip(other).map(|(x, y)| x * y).sum();
-            row[j] = (row[j] - sum) / other[j];
-        }
-        let squares: f64 = row[..i].iter().map(|x| x * x).sum();
-        row[i] = max(row[i] - squares, MIN_PIVOT * row[i]).sqrt();
-    }
-}
-
-fn forward(factor: &[f64], b: &mut [f64]) {
-    let n = b.len();
-    for i in 0..n {
-        let row = &factor[i * n..i * n + i + 1];
-        let sum: f64 = row[..i].iter().zip(&b[..i]).map(|(x, y)| x * y).sum();
-        b[i] = (b[i] - sum) / row[i];
-    }
-}
-
-fn backward(factor: &[f64], b: &mut [f64]) {
-    let n = b.len();
-    for i in (0..n).rev() {
-        let row = &factor[i * n..i * n + i + 1];
-        b[i] /= row[i];
-        let value = b[i];
-        b[..i].iter_mut().zip(row).for_each(|(x, y)| *x -= value * y);
-    }
-}
-
-/// Returns the larger number, by a comparison: `f64::max` is a function call in wasm.
-fn max(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }
 
 /// Minimum distance between the centres taken in the first round of the ordering of centres from coarse to fine, in

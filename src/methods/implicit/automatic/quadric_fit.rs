@@ -1,14 +1,14 @@
 //! Quadrics fitted to neighbourhoods of points: noise, positions and normals of the surface that do not follow the noise.
 //! Unlike planes, they do not take curvature for noise.
 
-use crate::math::{DMat3, DVec3, Vec3, symmetric};
+use crate::math::{DMat3, DVec3, Vec3, cholesky, symmetric};
 use crate::spatial::PointGrid;
 
 /// Number of coefficients of a quadric height field, a + bu + cv + du² + euv + fv².
 const COEFFICIENTS: usize = 6;
 
 /// A quadric height field over the plane of a neighbourhood.
-pub struct Quadric {
+pub struct QuadricFit {
     /// The point of the quadric next to the centre of the neighbourhood, along the normal of the plane.
     pub position: Vec3,
     /// Unit normal there, on either side.
@@ -19,10 +19,18 @@ pub struct Quadric {
     pub radius: f32,
 }
 
-impl Quadric {
-    /// Fits one to the `count` points nearest to `p`, which are searched from `radius` on; `None` if these do not determine it.
-    pub fn around(grid: &PointGrid, p: Vec3, count: usize, radius: f32) -> Option<Self> {
-        let near = grid.nearest(p, count, radius);
+/// Returns a grid for fits to points whose mean distance to the nearest neighbour is `spacing`.
+pub fn fitting_grid(points: &[Vec3], spacing: f64) -> PointGrid {
+    PointGrid::of(points, CELL * spacing as f32)
+}
+
+/// Side of a cell in mean spacings: about as far as the nearest points reach that are fitted.
+const CELL: f32 = 3.0;
+
+impl QuadricFit {
+    /// Fits one to the `count` points of a [`fitting_grid`] that are nearest to `p`; `None` if these do not determine it.
+    pub fn around(grid: &PointGrid, p: Vec3, count: usize) -> Option<Self> {
+        let near = grid.nearest(p, count, grid.cell());
         let offsets: Vec<DVec3> =
             near.iter().map(|&(_, i)| (grid.points()[i as usize] - p).as_dvec3()).collect();
         let reach = f64::from(near.last()?.0).sqrt();
@@ -32,7 +40,7 @@ impl Quadric {
         let mean = offsets.iter().sum::<DVec3>() / offsets.len() as f64;
         let spread = offsets.iter().fold(DMat3::ZERO, |sum, d| {
             let d = *d - mean;
-            sum + DMat3::from_cols(d * d.x, d * d.y, d * d.z)
+            sum + symmetric::outer(d)
         });
         let (_, axes) = symmetric::eigen(spread);
         let [normal, u, v] = [axes.x_axis, axes.y_axis, axes.z_axis];
@@ -57,40 +65,26 @@ fn dot(a: &[f64; COEFFICIENTS], b: &[f64; COEFFICIENTS]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// Returns the coefficients for which the sum of squared errors is least, from the normal equations by Cholesky's
-/// factorisation; `None` if the rows do not determine them.
+/// Returns the coefficients for which the sum of squared errors is least, from the normal equations; `None` if the rows do
+/// not determine them.
 fn least_squares(rows: &[([f64; COEFFICIENTS], f64)]) -> Option<[f64; COEFFICIENTS]> {
-    let (mut matrix, mut right) = ([[0.0; COEFFICIENTS]; COEFFICIENTS], [0.0; COEFFICIENTS]);
+    let (mut matrix, mut solution) = ([0.0; COEFFICIENTS * COEFFICIENTS], [0.0; COEFFICIENTS]);
     for (row, height) in rows {
         for i in 0..COEFFICIENTS {
-            right[i] += row[i] * height;
+            solution[i] += row[i] * height;
             for j in 0..COEFFICIENTS {
-                matrix[i][j] += row[i] * row[j];
+                matrix[i * COEFFICIENTS + j] += row[i] * row[j];
             }
         }
     }
-    for i in 0..COEFFICIENTS {
-        for j in 0..=i {
-            let sum: f64 = (0..j).map(|k| matrix[i][k] * matrix[j][k]).sum();
-            let rest = matrix[i][j] - sum;
-            if i > j {
-                matrix[i][j] = rest / matrix[j][j];
-            } else if rest > LEAST_PIVOT * rows.len() as f64 {
-                matrix[i][i] = rest.sqrt();
-            } else {
-                return None;
-            }
-        }
+    cholesky::factorise(&mut matrix, COEFFICIENTS);
+    let mut pivots = matrix.iter().step_by(COEFFICIENTS + 1).map(|root| root * root);
+    if !pivots.all(|pivot| pivot > LEAST_PIVOT * rows.len() as f64) {
+        return None;
     }
-    for i in 0..COEFFICIENTS {
-        let sum: f64 = (0..i).map(|k| matrix[i][k] * right[k]).sum();
-        right[i] = (right[i] - sum) / matrix[i][i];
-    }
-    for i in (0..COEFFICIENTS).rev() {
-        let sum: f64 = (i + 1..COEFFICIENTS).map(|k| matrix[k][i] * right[k]).sum();
-        right[i] = (right[i] - sum) / matrix[i][i];
-    }
-    Some(right)
+    cholesky::forward(&matrix, &mut solution);
+    cholesky::backward(&matrix, &mut solution);
+    Some(solution)
 }
 
 /// Least pivot, for each point, below which points do not determine a quadric: those on a line, say.
@@ -104,13 +98,13 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     #[test]
-    fn noise_is_told_from_curvature() {
+    fn curvature_is_not_measured_as_noise() {
         for noise in [0.0, 0.03] {
             let points: Vec<Vec3> =
                 on_ball(800).iter().zip(0..).map(|(&p, i)| p * (1.0 + [noise, -noise][i % 2])).collect();
-            let grid = PointGrid::of(&points, 0.1);
+            let grid = fitting_grid(&points, 0.04);
             for &p in points.iter().step_by(50) {
-                let fit = Quadric::around(&grid, p, 24, 0.1).unwrap();
+                let fit = QuadricFit::around(&grid, p, 24).unwrap();
                 assert!((fit.deviation - noise).abs() < 0.2 * noise + 1e-3, "{noise}: {}", fit.deviation);
                 assert!((fit.position.length() - 1.0).abs() < noise + 1e-3, "{noise}: {}", fit.position);
                 assert!(
@@ -125,7 +119,7 @@ mod tests {
     #[test]
     fn points_on_a_line_determine_no_quadric() {
         let line: Vec<Vec3> = (0..40).map(|i| Vec3::X * i as f32 * 0.01).collect();
-        assert!(Quadric::around(&PointGrid::of(&line, 0.1), line[20], 24, 0.1).is_none());
-        assert!(Quadric::around(&PointGrid::of(&line[..5], 0.1), line[2], 24, 0.1).is_none());
+        assert!(QuadricFit::around(&fitting_grid(&line, 0.01), line[20], 24).is_none());
+        assert!(QuadricFit::around(&fitting_grid(&line[..5], 0.01), line[2], 24).is_none());
     }
 }
