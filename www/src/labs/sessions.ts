@@ -81,11 +81,16 @@ export class Sessions {
     this.#waiting = undefined;
   }
 
-  /** Saves the session as a file; `included`: with its data. */
+  /** Saves the session as a file; `included`: with its data. Data that are opened meanwhile wait until it is saved. */
   async save(included: boolean): Promise<void> {
-    const { id: lab, opening, ui, states, address, content } = this.#lab;
+    const { opening, states } = this.#lab;
     const { source } = opening;
-    if (!source || !states.canChange) return;
+    if (source && states.canChange) await states.enqueue(() => this.#save(source, included));
+  }
+
+  // biome-ignore lint/suspicious/noExplicitAny: sessions do not look into links, data and models
+  async #save(source: Source<any, any, any>, included: boolean): Promise<void> {
+    const { id: lab, opening, ui, states, address, content } = this.#lab;
     try {
       ui.status.say(text('sessions.saving'));
       // A run that is paused and continued ends them.
