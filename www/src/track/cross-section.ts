@@ -12,6 +12,7 @@ export function crossSection(
   const heights = new Float32Array(vertices);
   const [x, y, z] = origin.map((value, axis) => value - (from[axis] ?? 0)) as Vec3;
   const offset = normal[0] * x + normal[1] * y + normal[2] * z;
+  let below = 0;
   for (let i = 0; i < vertices; i++) {
     const height =
       normal[0] * (positions[3 * i] ?? 0) +
@@ -20,7 +21,9 @@ export function crossSection(
       offset;
     // A vertex in the plane counts as above it, so that each triangle is cut twice or not at all.
     heights[i] = height === 0 ? 1e-12 : height;
+    if (height < 0) below += 1;
   }
+  if (below === 0 || below === vertices) return new Float32Array();
   const out: number[] = [];
   for (let i = 0; i < 3 * triangles; i += 3) {
     for (let side = 0; side < 3; side++) {

@@ -4,6 +4,9 @@ import { LANGUAGE, text } from '../texts';
 
 export { count } from '../texts';
 
+// To make one takes much longer than to use it.
+const FOUR_DIGITS = new Intl.NumberFormat(LANGUAGE, { maximumSignificantDigits: 4 });
+
 /**
  * Formats a number with up to four significant digits; magnitudes below 10⁻³ and from 10⁷ on as three digits times a
  * power of ten; a dash if it is not finite.
@@ -12,7 +15,7 @@ export function figure(value: number): string {
   if (!Number.isFinite(value)) return '–';
   const size = Math.abs(value);
   if (size !== 0 && (size < 1e-3 || size >= 1e7)) return value.toExponential(2);
-  return new Intl.NumberFormat(LANGUAGE, { maximumSignificantDigits: 4 }).format(value);
+  return FOUR_DIGITS.format(value);
 }
 
 /**

@@ -1,6 +1,7 @@
 import type { Label } from '../segment/labels';
 import { text } from '../texts';
 import { h, icon, uniqueId } from './dom';
+import { KeptRows } from './kept-rows';
 
 const EYE = 'M12 5C6 5 2.5 12 2.5 12S6 19 12 19s9.5-7 9.5-7S18 5 12 5zm0 11a4 4 0 1 1 0-8 4 4 0 0 1 0 8z';
 const CROSS = 'M6.4 5 12 10.6 17.6 5 19 6.4 13.4 12l5.6 5.6-1.4 1.4-5.6-5.6L6.4 19 5 17.6 10.6 12 5 6.4z';
@@ -21,6 +22,9 @@ export class LabelList {
   readonly element: HTMLElement;
   readonly #events: LabelListEvents;
   readonly #list = h('ul', { class: 'labels' });
+  readonly #rows = new KeptRows(this.#list, (label: Label, isActive: boolean, visible: boolean) =>
+    this.#item(label, isActive, visible),
+  );
   readonly #error = h('p', { class: 'field-error', role: 'alert' });
   readonly #group = uniqueId('label');
 
@@ -38,7 +42,12 @@ export class LabelList {
   show(labels: readonly Label[], active: number, hidden: ReadonlySet<number>): void {
     this.#error.textContent = '';
     const focused = this.#focused();
-    this.#list.replaceChildren(...labels.map((label) => this.#item(label, label.value === active, hidden)));
+    const shown = (label: Label): [Label, boolean, boolean] => [
+      label,
+      label.value === active,
+      !hidden.has(label.value),
+    ];
+    this.#rows.show(labels.map((label) => ({ key: label.value, shown: shown(label) })));
     if (focused) this.#list.querySelector<HTMLElement>(focused)?.focus();
   }
 
@@ -54,7 +63,7 @@ export class LabelList {
     return `[data-control="${control}"][data-value="${value}"]`;
   }
 
-  #item({ value, name, color }: Label, isActive: boolean, hidden: ReadonlySet<number>): HTMLElement {
+  #item({ value, name, color }: Label, isActive: boolean, visible: boolean): HTMLElement {
     const { onActive, onRename, onColor, onVisible, onRemove } = this.#events;
     const named = (control: string) => ({ 'data-control': control, 'data-value': value });
     const radio = h('input', {
@@ -86,7 +95,6 @@ export class LabelList {
       if (given) onRename(value, given);
       else field.value = name;
     });
-    const visible = !hidden.has(value);
     return h(
       'li',
       { 'data-current': isActive },

@@ -3,6 +3,7 @@ import type { Label } from '../segment/labels';
 import { text } from '../texts';
 import { h } from './dom';
 import { count, figure } from './format';
+import { KeptRows } from './kept-rows';
 import { sized } from './measures';
 
 /** Measures of a label and its surface; lengths are in world units. */
@@ -21,6 +22,7 @@ export interface LabelMeasures {
 export class LabelMeasureTable {
   readonly element: HTMLElement;
   readonly #body = h('tbody');
+  readonly #rows = new KeptRows(this.#body, row);
 
   constructor() {
     const heads = [
@@ -48,7 +50,8 @@ export class LabelMeasureTable {
     unit: Unit,
     more: { latency: { first?: number; smooth?: number }; updates: number },
   ): void {
-    this.#body.replaceChildren(...labels.map((label) => row(label, measures.get(label.value), unit)));
+    const shown = (label: Label): [Label, LabelMeasures | undefined, Unit] => [label, measures.get(label.value), unit];
+    this.#rows.show(labels.map((label) => ({ key: label.value, shown: shown(label) })));
     const all = labels.map(({ value, name }) => ({ name, ...(measures.get(value) ?? { value, voxels: 0 }) }));
     this.element.dataset.measures = JSON.stringify({ labels: all, ...more });
   }

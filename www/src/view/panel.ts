@@ -463,6 +463,7 @@ export function drawSegments(
   scaleY: number,
   color: string,
 ): void {
+  if (points.length === 0) return;
   context.beginPath();
   for (let i = 0; i + 3 < points.length; i += 4) {
     context.moveTo((points[i] ?? 0) * scaleX, (points[i + 1] ?? 0) * scaleY);
