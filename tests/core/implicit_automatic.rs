@@ -106,8 +106,8 @@ fn a_cavity_stays_hollow() {
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn parts_as_thin_as_the_noise_give_a_warning() {
-    let codes = |points: Vec<Vec3>| {
-        let mut surface = begun(Cloud { points, ..Cloud::default() });
+    let codes = |points: Vec<Vec3>, normals: Option<Vec<Vec3>>| {
+        let mut surface = begun(Cloud { points, normals, ..Cloud::default() });
         loop {
             let report = surface.step().unwrap();
             if report.done {
@@ -120,8 +120,11 @@ fn parts_as_thin_as_the_noise_give_a_warning() {
         let points = clean.iter().zip(&noisy);
         points.map(|(p, q)| Vec3::new(p.x, p.y, p.z * height) + (q - p)).collect::<Vec<_>>()
     };
-    assert_eq!(codes(flattened(1.0)), []);
-    assert_eq!(codes(flattened(0.03)), [WarningCode::ThinParts]);
+    assert_eq!(codes(flattened(1.0), None), []);
+    assert_eq!(codes(flattened(0.03), None), [WarningCode::ThinParts]);
+    // Where normals are given, they are consistent, but no point inside is found.
+    let normals = clean.iter().map(|p| Vec3::new(p.x, p.y, p.z / 0.03).normalize()).collect();
+    assert_eq!(codes(flattened(0.03), Some(normals)), [WarningCode::ThinParts]);
 }
 
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]

@@ -153,4 +153,20 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn parts_are_flipped_to_what_they_bound() {
+        let sphere = |count: usize, radius: f32| {
+            let area = 4.0 * PI * f64::from(radius * radius) / count as f64;
+            on_ball(count).into_iter().map(move |n| ((n * radius).as_dvec3(), n.as_dvec3() * area))
+        };
+        let (positions, vectors) = sphere(300, 1.0).chain(sphere(100, 0.5)).unzip();
+        let mut winding = Winding { positions, vectors, smoothing: 0.01 };
+        // Both outwards: the inner one bounds a ball in the ball, not a cavity.
+        winding.flip_parts(&[(300..400).collect(), (0..300).collect()]);
+        for (x, expected) in [(0.0, 0.0), (0.75, 1.0), (2.0, 0.0)] {
+            let found = winding.at(Vec3::X * x);
+            assert!((found - expected).abs() < 0.2, "{x}: {found}");
+        }
+    }
 }
