@@ -1,4 +1,4 @@
-import { checkProperties, denseCopy, integer, invalid, shallowCopy, typedArray, vec3 } from './check.js';
+import { checkProperties, choice, denseCopy, integer, invalid, shallowCopy, typedArray, vec3 } from './check.js';
 import type { Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { frameOf, type MeshFrame } from './mesh-file.js';
@@ -68,8 +68,19 @@ export interface MultiresOptions {
    * `detail` by smoothing and coarsening, or around the ellipsoids.
    */
   base?: Mesh;
-  /** Initial control ellipsoids: at least one, of which one has to touch the base. */
-  ellipsoids: ControlEllipsoid[];
+  /**
+   * Initial control ellipsoids: at least one, of which one has to touch the base. With `support: 'surface'` they leave the
+   * surface as it is where they are; if there are none, balls inside it are proposed, see
+   * {@link MultiresolutionModel.ellipsoids}.
+   */
+  ellipsoids?: ControlEllipsoid[];
+  /**
+   * What supports the surface. `'membrane'` (default): a membrane over the ellipsoids, as in the paper. `'surface'`:
+   * `detail` holds itself; it stays exactly as given, whatever closed surface it is, except where ellipsoids are moved,
+   * turned or stretched. What one does fades with the distance along the surface, and leaves more than half of its area as
+   * it is. No `base` is needed. An ellipsoid stops where the surface would fold up, and becomes its own target there.
+   */
+  support?: 'membrane' | 'surface';
   /** Initial parameters: any subset; the others have their defaults. */
   params?: MultiresParams;
 }
@@ -85,7 +96,8 @@ interface Counts {
   heldVertices: number;
 }
 
-const OPTIONS = ['detail', 'base', 'ellipsoids', 'params'];
+const OPTIONS = ['detail', 'base', 'ellipsoids', 'support', 'params'];
+const SUPPORTS = ['membrane', 'surface'] as const;
 
 /**
  * A detailed surface deformed, however far, by ellipsoids that support a low-frequency surface, whose connectivity
@@ -118,11 +130,13 @@ export class MultiresolutionModel implements Stepper {
    */
   constructor(given: MultiresOptions) {
     const known = checkProperties('options', given, OPTIONS) as MultiresOptions;
-    const packed = packedEllipsoids(known.ellipsoids);
+    const holdsItself = choice('support', known.support ?? 'membrane', SUPPORTS) === 'surface';
+    const ellipsoids = known.ellipsoids ?? (holdsItself ? [] : known.ellipsoids);
+    const packed = packedEllipsoids(ellipsoids as readonly ControlEllipsoid[]);
     const params = shallowCopy('params', known.params ?? {});
     this.#handle = new Handle('MultiresolutionModel', () => {
       const [detail, base] = [triangles('detail', known.detail), triangles('base', known.base)];
-      return new RawMultires(detail, base, packed, params);
+      return new RawMultires(detail, base, packed, params, holdsItself);
     });
     this.#meshHandles = [0, 1, 2].map((which) => new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh(which))));
     this.#warnings = new ModelWarnings(known.detail?.warnings, known.base?.warnings);

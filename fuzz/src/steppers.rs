@@ -297,7 +297,8 @@ pub fn multires(data: &[u8]) {
     let detail = bytes.chance(2).then(|| shape(bytes));
     let base = bytes.chance(6).then(|| shape(bytes));
     let ellipsoids = ellipsoids(bytes, 1.0);
-    let options = MultiresOptions { detail, base, ellipsoids, params: multires_params(bytes) };
+    let params = multires_params(bytes);
+    let options = MultiresOptions { detail, base, ellipsoids, params, ..MultiresOptions::default() };
     let Ok(mut model) = MultiresolutionModel::new(options) else { return };
     for _ in 0..3 {
         match bytes.below(6) {

@@ -14,7 +14,9 @@ use super::method::{method_bindings, shared};
 use vesicle::math::DVec3;
 use vesicle::mesh::TriangleMesh;
 use vesicle::methods::LiveSurface;
-use vesicle::methods::multires::{ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel};
+use vesicle::methods::multires::{
+    ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, Support,
+};
 
 /// The raw handle of the TypeScript class `MultiresolutionModel`, which shares the model with the live meshes of its
 /// surfaces.
@@ -54,19 +56,22 @@ impl LiveSurface for BaseView {
 impl RawMultires {
     /// Creates a multiresolution model. `detail` is the surface with detail; without it the model has none. `base` is
     /// the smooth surface M₀, derived if not given. `ellipsoids` are the control ellipsoids, twelve numbers each: the
-    /// centre and three semi-axis vectors. Properties of `params` replace the default parameters.
+    /// centre and three semi-axis vectors; if there are none, they are proposed for a surface that `holds_itself`. Properties of
+    /// `params` replace the default parameters.
     #[wasm_bindgen(constructor)]
     pub fn new(
         detail: Option<TriangleCopy>,
         base: Option<TriangleCopy>,
         ellipsoids: &Float64Array,
         params: &JsValue,
+        holds_itself: bool,
     ) -> Result<RawMultires, JsValue> {
         let options = MultiresOptions {
             detail: detail.map(|mesh| mesh.0),
             base: base.map(|mesh| mesh.0),
             ellipsoids: unpacked(ellipsoids)?,
             params: with_overrides(&MultiresParams::default(), params)?,
+            support: if holds_itself { Support::Surface } else { Support::Membrane },
         };
         Ok(RawMultires(shared(MultiresolutionModel::new(options))?))
     }

@@ -5,6 +5,7 @@ mod bounds;
 pub mod cholesky;
 mod conjugate_gradients;
 pub mod crossing;
+mod directions;
 mod groups;
 mod growth;
 mod min_max;
@@ -20,6 +21,7 @@ pub mod vectors;
 
 pub use bounds::{Bounds, BoxTree, Ray, box_corners};
 pub use conjugate_gradients::ConjugateGradients;
+pub use directions::spread_directions;
 pub use glam::{DAffine3, DMat3, DVec2, DVec3, IVec3, Mat3, Vec2, Vec3, Vec3Swizzles, Vec4};
 pub use groups::Groups;
 pub use growth::{make_room, resize, resize_within};

@@ -38,19 +38,23 @@ pub fn geodesic_distances(mesh: &TriangleMesh, from: u32) -> Result<Vec<f64>, Me
         let problem = format!("must be below the number of vertices ({vertices}), got {from}");
         return Err(MeshError::InvalidArgument { parameter: "fromVertex", problem });
     }
-    let opposite_edges = mesh.opposite_edges();
-    let mut front = Front::new(mesh, from as usize);
-    while let Some(v) = front.pop() {
-        front.propagate(v, opposite_edges.of(v));
-    }
-    Ok(front.distances)
+    let mut front = Front::new(mesh, &[(from, 0.0)]);
+    front.origin = Some(mesh.positions[from as usize].as_dvec3());
+    Ok(front.spread(mesh))
 }
 
-/// The state of the propagation in [`geodesic_distances`]: tentative distances from the origin, a vertex, and a queue
-/// of vertices whose distance is to be propagated.
+/// Returns the geodesic distance to every vertex from the nearest of several `sources`: vertices, each with the distance
+/// that it has already. Otherwise as [`geodesic_distances`]; the vertices must exist.
+pub fn geodesic_distances_from(mesh: &TriangleMesh, sources: &[(u32, f64)]) -> Vec<f64> {
+    Front::new(mesh, sources).spread(mesh)
+}
+
+/// The state of the propagation in [`geodesic_distances`]: tentative distances from the sources, and a queue of vertices
+/// whose distance is to be propagated.
 struct Front<'a> {
     positions: &'a [Vec3],
-    origin: DVec3,
+    /// The only source, than whose straight distance no other is shorter.
+    origin: Option<DVec3>,
     distances: Vec<f64>,
     /// By vertex, how often its distance has been propagated.
     propagations: Vec<u8>,
@@ -61,17 +65,26 @@ struct Front<'a> {
 }
 
 impl<'a> Front<'a> {
-    fn new(mesh: &'a TriangleMesh, from: usize) -> Self {
+    fn new(mesh: &'a TriangleMesh, sources: &[(u32, f64)]) -> Self {
         let positions = mesh.positions.as_slice();
-        let mut distances = vec![f64::INFINITY; positions.len()];
-        distances[from] = 0.0;
-        Self {
+        let mut front = Self {
             positions,
-            origin: positions[from].as_dvec3(),
-            distances,
+            origin: None,
+            distances: vec![f64::INFINITY; positions.len()],
             propagations: vec![0; positions.len()],
-            queue: BinaryHeap::from([Reverse((0, from as u32))]),
+            queue: BinaryHeap::new(),
+        };
+        sources.iter().for_each(|&(v, distance)| front.relax(v as usize, distance));
+        front
+    }
+
+    /// Propagates all distances, and returns them.
+    fn spread(mut self, mesh: &TriangleMesh) -> Vec<f64> {
+        let opposite_edges = mesh.opposite_edges();
+        while let Some(v) = self.pop() {
+            self.propagate(v, opposite_edges.of(v));
         }
+        self.distances
     }
 
     /// Removes the nearest vertex from the queue and returns its index; `None` if the queue is empty. Skips entries
@@ -98,15 +111,16 @@ impl<'a> Front<'a> {
         }
     }
 
-    /// Returns the distance from the origin to vertex `c` by paths along the edges of the triangle `a b c` or through
-    /// it, given the distances of `a` and `b`; at least the straight distance.
+    /// Returns the distance from the sources to vertex `c` by paths along the edges of the triangle `a b c` or through
+    /// it, given the distances of `a` and `b`; at least the straight distance from a single source.
     fn path_length(&self, a: usize, b: usize, c: usize) -> f64 {
         let [p, q, r] = [a, b, c].map(|v| self.positions[v].as_dvec3());
         let (to_a, to_b) = (self.distances[a], self.distances[b]);
         let along_edges = (to_a + p.distance(r)).min(to_b + q.distance(r));
         let through = through_edge([to_a, to_b], q - p, r - p);
         // Unfolding a curved surface can underestimate the distance.
-        through.map_or(along_edges, |d| d.min(along_edges)).max(r.distance(self.origin))
+        let shortest = self.origin.map_or(0.0, |origin| r.distance(origin));
+        through.map_or(along_edges, |d| d.min(along_edges)).max(shortest)
     }
 
     fn relax(&mut self, v: usize, distance: f64) {

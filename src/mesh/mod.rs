@@ -49,7 +49,7 @@ pub use curvature::{Curvature, curvature};
 pub(crate) use disjoint_sets::DisjointSets;
 pub use edits::OppositeVertices;
 pub use error::{EditError, MeshError};
-pub use geodesic::geodesic_distances;
+pub use geodesic::{geodesic_distances, geodesic_distances_from};
 pub use ids::VertexId;
 pub(crate) use ids::sort_distinct;
 pub use journal::TriangleCorners;

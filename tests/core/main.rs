@@ -38,6 +38,7 @@ mod mesh_oddities;
 mod mesh_spaces;
 mod multires;
 mod multires_fuzz;
+mod multires_held;
 mod plane_cut;
 mod refresh;
 mod remesh;

@@ -40,6 +40,7 @@ fn bumpy_model(params: MultiresParams) -> MultiresolutionModel {
         base: Some(Mesh::icosphere(Vec3::ZERO, 1.0, 0.1).unwrap().to_triangles()),
         ellipsoids: vec![ball(0.0, 0.0, 0.0, 0.995), ball(0.2, 0.0, 0.0, 0.5)],
         params,
+        ..Default::default()
     };
     MultiresolutionModel::new(options).unwrap()
 }

@@ -68,7 +68,8 @@ fn begun(random: &mut Random) -> Option<(MultiresolutionModel, usize)> {
     let count = 1 + random.below(4);
     let ellipsoids: Vec<_> = (0..count).map(|_| random_ellipsoid(random, 1.0)).collect();
     let detail = (random.below(2) == 0).then(|| random_detail(random));
-    let options = MultiresOptions { detail, ellipsoids, params: random_params(random), base: None };
+    let params = random_params(random);
+    let options = MultiresOptions { detail, ellipsoids, params, ..MultiresOptions::default() };
     match MultiresolutionModel::new(options) {
         Ok(model) => Some((model, count)),
         // Tips are too sharp for the edges, some ellipsoids are outside the bumps, or no base can be computed.

@@ -6,7 +6,7 @@ use super::camera::Camera;
 use super::cloud::Cloud;
 use super::normals::{Normals, estimated_normals};
 use super::sampling::subsampled;
-use crate::math::{Bounds, DVec3, Vec3};
+use crate::math::{Bounds, Vec3, spread_directions};
 use crate::spatial::PointGrid;
 
 /// Number of exterior points on a sphere around all input points; they are always added.
@@ -177,14 +177,8 @@ fn sphere_around(points: &[Vec3]) -> Vec<Vec3> {
     let bounds = Bounds::from_points(points);
     let [min, max] = [bounds.min, bounds.max].map(|corner| corner.as_dvec3());
     let radius = 0.5 * SPHERE * max.distance(min);
-    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    let point = |i: usize| {
-        let z = 1.0 - (2 * i + 1) as f64 / SPHERE_POINTS as f64;
-        let (across, angle) = ((1.0 - z * z).sqrt(), golden * i as f64);
-        let unit = DVec3::new(across * libm::cos(angle), across * libm::sin(angle), z);
-        (0.5 * (min + max) + unit * radius).as_vec3()
-    };
-    (0..SPHERE_POINTS).map(point).collect()
+    let centre = 0.5 * (min + max);
+    spread_directions(SPHERE_POINTS).map(|unit| (centre + unit * radius).as_vec3()).collect()
 }
 
 /// Edge length of the voxels that decide whether something hides a surface point from a camera, in mean spacings of the
@@ -251,7 +245,7 @@ impl OccupancyGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Random;
+    use crate::math::{DVec3, Random};
     use crate::methods::implicit::cloud::mean_spacing;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;

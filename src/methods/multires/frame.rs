@@ -247,19 +247,19 @@ impl Prediction {
 }
 
 /// Measures the time of each part of a frame, for [`StepReport::times`](crate::methods::StepReport::times).
-struct Lap<'a> {
+pub(super) struct Lap<'a> {
     clock: fn() -> f64,
     start: f64,
     times: &'a mut Times,
 }
 
 impl<'a> Lap<'a> {
-    fn new(clock: fn() -> f64, times: &'a mut Times) -> Self {
+    pub fn new(clock: fn() -> f64, times: &'a mut Times) -> Self {
         Self { clock, start: clock(), times }
     }
 
     /// Adds the time since the last call, or since the lap was created, to the time of `part`, in milliseconds.
-    fn end(&mut self, part: &'static str) {
+    pub fn end(&mut self, part: &'static str) {
         let now = (self.clock)();
         self.times.add(part, now - self.start);
         self.start = now;

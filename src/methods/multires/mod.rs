@@ -7,6 +7,9 @@
 //! (`correspondence`; section 3), where λ is sampled to reconstruct the detail on S (section 6). Without detail the
 //! model is a lava lamp.
 //!
+//! Instead, a surface can hold itself (`held`): it stays as it is given, except where ellipsoids (`grip`, `handles`;
+//! proposed by `proposal`) move it. The membrane has no part in it.
+//!
 //! # Guarantees
 //! After every step the deformed base and the detailed surface are closed, oriented 2-manifolds without
 //! self-intersections. The same input gives the same bits, natively and in wasm.
@@ -22,10 +25,14 @@ mod detail;
 mod distortion;
 mod ellipsoid;
 mod frame;
+mod grip;
+mod handles;
+mod held;
 mod membrane;
 mod motion;
 mod params;
 mod prisms;
+mod proposal;
 mod setup;
 mod space;
 mod state;
@@ -34,7 +41,7 @@ mod topology;
 
 pub use distortion::Distortion;
 pub use ellipsoid::ControlEllipsoid;
-pub use params::{Energy, MultiresParams, Topology};
+pub use params::{Energy, MultiresParams, Support, Topology};
 
 use super::method::method;
 use super::{LiveSurface, MethodError, StepReport, Times};
@@ -45,9 +52,11 @@ use containment::contains_centres;
 use correspondence::{Correspondence, Current, folded, project};
 use detail::{Bands, DetailSampling, Detailed, detailed};
 use ellipsoid::{Ellipsoid, check_ellipsoids, check_tips};
+use held::{Held, Placed};
 use membrane::{pushed_positions, solve_with};
 use motion::MovingEllipsoids;
-use setup::{check_size, identity, set_up};
+use proposal::proposed;
+use setup::{cannot_hold_itself, check_size, identity, set_up, set_up_surface};
 use space::ModelSpace;
 use topology::displacements_to;
 
@@ -59,8 +68,11 @@ pub struct MultiresOptions {
     /// The base M₀, a low-frequency approximation of the detailed surface. By default it is made from the detailed
     /// surface, or around the ellipsoids if there is none.
     pub base: Option<TriangleMesh>,
-    /// The control ellipsoids that the membrane is spanned over, at their initial positions.
+    /// The control ellipsoids, at their initial positions: those that the membrane is spanned over, at least one, or those
+    /// that leave a surface that holds itself as it is. If there are none for the latter, balls inside it are proposed.
     pub ellipsoids: Vec<ControlEllipsoid>,
+    /// What supports the surface.
+    pub support: Support,
     /// The parameters. If both edge bounds are 0, they are derived from the area of the base, else of the detail, else
     /// of the ellipsoids; a single one that is 0 is derived from the other.
     pub params: MultiresParams,
@@ -92,6 +104,8 @@ pub struct MultiresolutionModel {
     /// The map T: the point of the base M₀ that belongs to each vertex of `surface`, by slot.
     correspondence: Correspondence,
     detailed: Detailed,
+    /// The handles of a surface that holds itself; `None` for a membrane.
+    held: Option<Held>,
     /// The collision guard, which shortens displacements so that no triangles intersect. Only its memory is reused
     /// between frames, not its state.
     guard: Embedding,
@@ -135,7 +149,10 @@ impl MultiresolutionModel {
     /// [`MethodError::Mesh`] for a detail or a base that is invalid, open or not manifold, or for a base that
     /// intersects itself; [`MethodError::TooManyVertices`] if the edge bounds are too short for the area of the base.
     pub fn new(options: MultiresOptions) -> Result<Self, MethodError> {
-        let MultiresOptions { detail, base, ellipsoids: given, params } = options;
+        if options.support == Support::Surface {
+            return Self::holding_itself(options);
+        }
+        let MultiresOptions { detail, base, ellipsoids: given, params, .. } = options;
         check_ellipsoids(&given)?;
         let space = ModelSpace::of(detail.as_ref().or(base.as_ref()), &given);
         let [detail, base] = [detail, base].map(|mesh| mesh.map(|mesh| space.mesh(mesh)));
@@ -177,6 +194,7 @@ impl MultiresolutionModel {
             surface,
             correspondence,
             detailed,
+            held: None,
             guard,
             iteration: 0,
             refreshed_frames: 0,
@@ -186,6 +204,56 @@ impl MultiresolutionModel {
         };
         model.components = measure(&model.surface.to_triangles()).components as u32;
         Ok(model)
+    }
+
+    /// Creates a model of a surface that holds itself.
+    fn holding_itself(options: MultiresOptions) -> Result<Self, MethodError> {
+        let MultiresOptions { detail, base, ellipsoids: given, params, .. } = options;
+        let Some(detail) = detail.filter(|_| base.is_none()) else {
+            return Err(cannot_hold_itself(base.is_some()));
+        };
+        if !given.is_empty() {
+            check_ellipsoids(&given)?;
+        }
+        let space = ModelSpace::of(Some(&detail), &given);
+        let (surface, params) = set_up_surface(space.mesh(detail), space.params(&params))?;
+        let mut ellipsoids = space.ellipsoids(&given);
+        if ellipsoids.is_empty() {
+            ellipsoids = proposed(&surface);
+            check_ellipsoids(&ellipsoids)?;
+        }
+        let held = Held::new(&surface, &ellipsoids, params.edge_max)?;
+        let Placed { mesh, points, .. } = held.start().clone();
+        let shown = identity(&surface.walker);
+        let detailed = Detailed {
+            mesh: Mesh::from_triangles(surface.walker.mesh())?,
+            points: shown,
+            unmatched_vertices: 0,
+            held_vertices: 0,
+        };
+        Ok(Self {
+            params: space.params_in_world(&params),
+            space,
+            components: measure(surface.walker.mesh()).components as u32,
+            bands: Bands::new(vec![surface]),
+            ellipsoids: MovingEllipsoids::new(&ellipsoids),
+            model_params: params,
+            surface: mesh,
+            correspondence: points,
+            detailed,
+            held: Some(held),
+            guard: Embedding::default(),
+            iteration: 0,
+            refreshed_frames: 0,
+            frames_at_rest: 0,
+            residual: 0.0,
+            clock: || 0.0,
+        })
+    }
+
+    /// Returns what supports the surface.
+    pub fn support(&self) -> Support {
+        if self.held.is_some() { Support::Surface } else { Support::Membrane }
     }
 
     /// Sets the clock, in milliseconds, for [`StepReport::times`]. By default all times are 0: the core has no clock of
@@ -214,6 +282,9 @@ impl MultiresolutionModel {
     /// coarse to fine, to show how the solver works (figure 8 of Kobbelt, Bareuther & Seidel).
     pub fn levels(&self) -> Vec<TriangleMesh> {
         let mut levels = Vec::new();
+        if self.held.is_some() {
+            return vec![self.base_surface()];
+        }
         let ellipsoids = self.ellipsoids.now();
         let mut mesh = self.surface.clone();
         solve_with(&mut mesh, &ellipsoids, &self.model_params, self.model_params.levels, |mesh| {
@@ -260,7 +331,9 @@ impl MultiresolutionModel {
     pub fn set_params(&mut self, params: MultiresParams) -> Result<(), MethodError> {
         params.validate()?;
         let inner = self.space.params(&params);
-        check_tips(&self.ellipsoids.targets(), inner.edge_max)?;
+        if self.held.is_none() {
+            check_tips(&self.ellipsoids.targets(), inner.edge_max)?;
+        }
         check_size(area(&self.surface), &inner)?;
         self.params = params;
         let before = std::mem::replace(&mut self.model_params, inner);
@@ -273,6 +346,10 @@ impl MultiresolutionModel {
     /// Applies parameters that differ from those `before`: a change of `supersample` alone only reconstructs the
     /// detail, after any other the next steps solve the membrane again.
     fn apply_params(&mut self, before: &MultiresParams) {
+        if let Some(held) = &mut self.held {
+            held.is_unsettled = true;
+            return;
+        }
         let supersample = self.model_params.supersample;
         if self.model_params == (MultiresParams { supersample, ..before.clone() }) {
             self.reconstruct_detail();
@@ -298,6 +375,9 @@ impl MultiresolutionModel {
     pub fn set_ellipsoids(&mut self, given: &[ControlEllipsoid]) -> Result<(), MethodError> {
         check_ellipsoids(given)?;
         let given = &self.space.ellipsoids(given);
+        if self.held.is_some() {
+            return Ok(self.set_handles(given)?);
+        }
         check_tips(&given.iter().map(Ellipsoid::new).collect::<Vec<_>>(), self.model_params.edge_max)?;
         let surface = &self.surface;
         self.ellipsoids
@@ -350,12 +430,15 @@ impl MultiresolutionModel {
         let mut changes = Changes::default();
         if !self.is_done() {
             self.iteration = self.iteration.wrapping_add(1);
-            changes = self.frame(&mut times)?;
+            changes = if self.held.is_some() { self.held_frame(&mut times) } else { self.frame(&mut times)? };
         }
         Ok(self.report(changes, times))
     }
 
     fn is_done(&self) -> bool {
+        if let Some(held) = &self.held {
+            return self.ellipsoids.have_arrived() && !held.is_unsettled && self.residual <= TOLERANCE;
+        }
         let has_converged =
             self.residual <= TOLERANCE && self.refreshed_frames == 0 && self.has_edges_as_wanted();
         let has_settled = has_converged || self.frames_at_rest >= MAX_FRAMES_AT_REST;
@@ -365,6 +448,9 @@ impl MultiresolutionModel {
 
     /// Reconstructs the detail on the deformed base, after a change of the base or of the parameters for the detail.
     fn reconstruct_detail(&mut self) {
+        if self.held.is_some() {
+            return self.show_held();
+        }
         let detailed = detailed(
             &self.surface,
             &self.correspondence,

@@ -63,6 +63,21 @@ impl MovingEllipsoids {
         self.0 = moving;
     }
 
+    /// Sets new targets, matched by index, of ellipsoids that support no membrane: a new one is at its target, and one
+    /// without a target in `given` is removed, both at once.
+    pub fn set_poses(&mut self, given: &[ControlEllipsoid]) {
+        let pose = |(k, given): (usize, &ControlEllipsoid)| {
+            let target = Ellipsoid::new(given);
+            MovingEllipsoid { now: self.0.get(k).map_or(target, |known| known.now), target: Some(target) }
+        };
+        self.0 = given.iter().enumerate().map(pose).collect();
+    }
+
+    /// Makes the present poses the targets.
+    pub fn stop(&mut self) {
+        self.0.iter_mut().for_each(|moving| moving.target = Some(moving.now));
+    }
+
     /// Returns the state in which a new ellipsoid starts: small at its target, or inside the nearest ellipsoid if the
     /// centre of its target is outside of the membrane. An ellipsoid that grew outside would push the membrane away
     /// instead of being covered by it.
@@ -102,18 +117,24 @@ impl MovingEllipsoids {
     }
 
     /// Returns the number of steps, possibly fractional, that the slowest ellipsoid needs to reach its target; at least
-    /// 1 if one is being removed.
-    pub fn steps_left(&self) -> f64 {
+    /// 1 if one is being removed. A step may be as long as `shift`, in units of the mesh, however small the ellipsoid.
+    fn steps_left(&self, shift: f64) -> f64 {
         self.0
             .iter()
-            .map(|ellipsoid| ellipsoid.target.map_or(1.0, |target| steps_between(&ellipsoid.now, &target)))
+            .map(|moving| moving.target.map_or(1.0, |target| steps_between(&moving.now, &target, shift)))
             .fold(0.0, f64::max)
     }
 
     /// Moves all ellipsoids by one step, each by the same share of its remaining motion, so that ellipsoids that move
     /// together stay together. Those that are being removed shrink by the factor [`MAX_GROWTH`].
     pub fn advance(&mut self) {
-        let share = 1.0 / self.steps_left().max(1.0);
+        self.advance_by(1.0, 0.0);
+    }
+
+    /// Moves all ellipsoids as [`Self::advance`] does, by a part of a step, which may be as long as `shift`, in units of the
+    /// mesh, however small the ellipsoid.
+    pub fn advance_by(&mut self, part: f64, shift: f64) {
+        let share = part / self.steps_left(shift).max(1.0);
         for moving in &mut self.0 {
             match moving.target {
                 Some(target) if share == 1.0 => moving.now = target,
@@ -135,9 +156,9 @@ impl MovingEllipsoids {
 }
 
 /// Returns the number of steps, possibly fractional, that an ellipsoid takes from one state to another: the maximum
-/// over translation, rotation and growth.
-fn steps_between(from: &Ellipsoid, to: &Ellipsoid) -> f64 {
-    let max_shift = MAX_SHIFT * from.shortest_axis().max(to.shortest_axis());
+/// over translation, rotation and growth. A translation as long as `shift` is always one step.
+fn steps_between(from: &Ellipsoid, to: &Ellipsoid, shift: f64) -> f64 {
+    let max_shift = (MAX_SHIFT * from.shortest_axis().max(to.shortest_axis())).max(shift);
     let shift = from.center.distance(to.center) / max_shift;
     let turns = 2.0 * libm::acos(quaternion(from).dot(quaternion(to)).abs().min(1.0)) / MAX_TURN;
     let ratios = to.lengths / from.lengths;

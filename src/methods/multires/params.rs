@@ -111,6 +111,18 @@ choices! {
     }
 }
 
+choices! {
+    /// What supports the surface of a multiresolution model.
+    #[derive(Default)]
+    pub enum Support {
+        /// A membrane over the ellipsoids, as in Kobbelt, Bareuther & Seidel.
+        #[default]
+        Membrane = "membrane",
+        /// The surface holds itself: it is as given except where ellipsoids move it.
+        Surface = "surface",
+    }
+}
+
 /// Default ε_min as a share of the target edge. With the default ratio of the two bounds, 2.23, splits of long edges
 /// leave no short ones behind.
 const MIN_SHARE: f64 = 0.65;

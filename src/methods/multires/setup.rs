@@ -60,6 +60,33 @@ pub(super) fn set_up(
     Ok(bands)
 }
 
+/// Validates a surface that is to hold itself. Returns it, and the parameters with edge bounds of 0 replaced by defaults.
+///
+/// # Errors
+/// As [`set_up`].
+pub(super) fn set_up_surface(
+    detail: TriangleMesh,
+    params: MultiresParams,
+) -> Result<(Rc<Band>, MultiresParams), MethodError> {
+    // As it is, with the order of its vertices, unless vertices have to be merged first.
+    let is_closed =
+        Mesh::from_triangles(&detail).is_ok_and(|mesh| mesh.vertex_count() == detail.positions.len());
+    let detail = if is_closed { detail } else { validate_closed("detail", detail)? };
+    check_edges("detail", &detail)?;
+    let area = measure(&detail).area;
+    let params = params.with_target(edge_for(area, DEFAULT_TRIANGLES));
+    params.validate()?;
+    check_size(area, &params)?;
+    Ok((Band::of(detail)?, params))
+}
+
+/// The error for a surface that is to hold itself, but is given with a base, or not at all.
+pub(super) fn cannot_hold_itself(has_base: bool) -> MethodError {
+    let problem =
+        if has_base { "\"surface\" needs no base, got one" } else { "\"surface\" needs a detail, got none" };
+    MethodError::invalid("support", problem)
+}
+
 /// Returns a mesh with vertices at the same position merged, see [`TriangleMesh::welded`], after checking that it is
 /// closed and manifold, and its edges not too short.
 ///

@@ -2,6 +2,7 @@
 //! decomposition is made again from the same options, and the detail is reconstructed.
 
 use super::correspondence::{BasePoint, Correspondence};
+use super::held::SavedHandles;
 use super::motion::MovingEllipsoids;
 use super::{MultiresParams, MultiresolutionModel};
 use crate::math::{DVec3, Vec3};
@@ -11,6 +12,8 @@ use crate::methods::saved::{Hash, Magic, can_be_checked, decode, encode};
 use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLMRS\x03";
+/// That of a surface that holds itself, whose handles follow.
+const HELD: Magic = *b"VSCLMRH\x01";
 
 /// The saved state: everything of a run but the decomposition of its input surfaces.
 #[derive(Serialize, Deserialize)]
@@ -31,21 +34,22 @@ struct State {
 impl MultiresolutionModel {
     /// Serialises the run for [`Self::restore`], without the surfaces that the model was made from.
     pub fn save(&self) -> Vec<u8> {
-        encode(
-            &MAGIC,
-            &State {
-                fingerprint: self.fingerprint(),
-                params: self.model_params.clone(),
-                moving: self.ellipsoids.clone(),
-                surface: self.surface.clone(),
-                correspondence: self.correspondence.iter().map(|at| (at.triangle, at.weights)).collect(),
-                iteration: self.iteration,
-                passing: self.refreshed_frames,
-                at_rest: self.frames_at_rest,
-                components: self.components,
-                residual: self.residual,
-            },
-        )
+        let state = State {
+            fingerprint: self.fingerprint(),
+            params: self.model_params.clone(),
+            moving: self.ellipsoids.clone(),
+            surface: self.surface.clone(),
+            correspondence: self.correspondence.iter().map(|at| (at.triangle, at.weights)).collect(),
+            iteration: self.iteration,
+            passing: self.refreshed_frames,
+            at_rest: self.frames_at_rest,
+            components: self.components,
+            residual: self.residual,
+        };
+        match &self.held {
+            Some(held) => encode(&HELD, &(state, held.save())),
+            None => encode(&MAGIC, &state),
+        }
     }
 
     /// Restores a run from the bytes of [`Self::save`]. This model must have the same surfaces as the saved one;
@@ -54,7 +58,12 @@ impl MultiresolutionModel {
     /// # Errors
     /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let state: State = decode(&MAGIC, bytes)?;
+        let (state, handles): (State, Option<SavedHandles>) = if self.held.is_some() {
+            let (state, handles) = decode(&HELD, bytes)?;
+            (state, Some(handles))
+        } else {
+            (decode(&MAGIC, bytes)?, None)
+        };
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
         if state.fingerprint != self.fingerprint() {
             return bad("surfaces", "the state belongs to another detail, base or start");
@@ -70,6 +79,14 @@ impl MultiresolutionModel {
         let Some(correspondence) = self.correspondence_of(&state.correspondence) else {
             return bad("link", "refers to a missing triangle");
         };
+        if let (Some(held), Some(handles)) = (&self.held, handles) {
+            let restored = held.restored(handles, state.surface.slots());
+            let Some(restored) = restored.filter(|held| state.moving.now().len() == held.handles.len())
+            else {
+                return bad("handles", "inconsistent");
+            };
+            self.held = Some(restored);
+        }
         (self.model_params, self.ellipsoids, self.correspondence) =
             (state.params, state.moving, correspondence);
         self.params = self.space.params_in_world(&self.model_params);

@@ -34,6 +34,18 @@ impl Embedding {
         moving: &[VertexId],
         displacements: &mut [Vec3],
     ) -> Vec<(VertexId, f32)> {
+        self.move_some_unless(mesh, moving, displacements, usize::MAX).unwrap_or_default()
+    }
+
+    /// Moves vertices as [`Self::move_some`] does; returns `None`, with nothing moved, if more than `most` of them would
+    /// have to be held back.
+    pub fn move_some_unless(
+        &mut self,
+        mesh: &mut Mesh,
+        moving: &[VertexId],
+        displacements: &mut [Vec3],
+        most: usize,
+    ) -> Option<Vec<(VertexId, f32)>> {
         self.sync_without_cells(mesh);
         let from: Vec<Vec3> = moving.iter().map(|&v| mesh.position(v)).collect();
         let positions = mesh.positions_mut();
@@ -55,6 +67,10 @@ impl Embedding {
             if held.is_empty() {
                 break;
             }
+            if held.len() > most {
+                self.move_back(mesh, moving, &from);
+                return None;
+            }
             let before: Vec<Vec3> = held.iter().map(|&(v, _)| mesh.position(v)).collect();
             for (&(v, k), &before) in held.iter().zip(&before) {
                 let i = v.index();
@@ -72,7 +88,17 @@ impl Embedding {
             self.apply_motion(mesh, held.into_iter().map(|(v, _)| v).zip(before));
         }
         self.version = Some(mesh.geometry_version());
-        shares.into_iter().collect()
+        Some(shares.into_iter().collect())
+    }
+
+    fn move_back(&mut self, mesh: &mut Mesh, moving: &[VertexId], to: &[Vec3]) {
+        let from: Vec<Vec3> = moving.iter().map(|&v| mesh.position(v)).collect();
+        moving.iter().zip(to).for_each(|(&v, &p)| mesh.set_position(v, p));
+        self.apply_motion(mesh, moving.iter().copied().zip(from));
+        // Triangles that intersected are tested anew.
+        moving.iter().for_each(|&v| self.mark_dirty(v, Checks::ALL));
+        self.check_dirty(mesh);
+        self.version = Some(mesh.geometry_version());
     }
 }
 

@@ -1,0 +1,441 @@
+//! A surface that holds itself: it stays as it was given, except where ellipsoids move it as handles.
+//!
+//! Other than the membrane of the paper, which only the ellipsoids support, it needs no base over which the whole surface
+//! is a graph. Each point keeps its place on the given surface (the map T), from which its position follows: what the
+//! handles do, they can undo.
+
+use super::correspondence::{BasePoint, Correspondence, UNSET};
+use super::detail::{Band, Detailed};
+use super::ellipsoid::Ellipsoid;
+use super::frame::Lap;
+use super::grip::gripped;
+use super::handles::{Handle, Motion, motion_at};
+use super::setup::identity;
+use super::topology::displacements_to;
+use super::{ControlEllipsoid, MAX_VERTICES, MultiresolutionModel, typical_edge};
+use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
+use crate::math::{Bounds, Vec3, triangle};
+use crate::mesh::{EditError, Mesh, MeshError, TriangleMesh, VertexId, geodesic_distances_from};
+use crate::methods::Times;
+use crate::remesh::{Changes, Embedding};
+use crate::spatial::SurfaceWalker;
+use serde::{Deserialize, Serialize};
+
+/// Largest distance along the surface at which the effect of a handle ends, as a share of the diagonal of the bounding box.
+const REACH: f64 = 0.35;
+/// Largest shares of the area of the surface that move with a handle as if they were rigid, and that it has an effect on.
+const AREAS: [f64; 2] = [0.1, 0.45];
+/// Distance from a handle's nearest part of the surface up to which the surface moves with it as if it were rigid, as a
+/// share of its shortest semi-axis.
+const RIGID: f64 = 0.4;
+
+/// Factor by which an edge is stretched before it is halved.
+const STRETCH: f32 = 1.5;
+
+/// Share of the vertices, and their number, up to which some may be held back in a frame, so that the surface does not
+/// intersect itself. With more, it is folding up, and the handles stop.
+const MOST_BLOCKED: f64 = 0.002;
+const LEAST_BLOCKED: usize = 20;
+
+/// Length of a step of the smallest handles, as a share of their largest reach: nothing has to follow them from outside.
+const STEP: f64 = 0.15;
+
+/// Number of attempts at a step of the handles, each half as long as the one before.
+const ATTEMPTS: u32 = 3;
+
+/// Number of vertices added to the given surface after which no more edges are halved: needles take many.
+const MOST_ADDED: usize = 15_000;
+
+/// Maximum number of passes in which edges of the given surface are halved: each halves the longest.
+const PASSES: usize = 40;
+
+/// A surface with the place of each vertex on the given one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Placed {
+    pub mesh: Mesh,
+    /// The map T: the place of each vertex on the given surface, by slot.
+    pub points: Correspondence,
+    /// The distance of each vertex from each handle along the given surface, by slot, handle by handle.
+    pub distances: Vec<f32>,
+}
+
+/// What the handles of a surface need: their poses, and the surface that they leave as it is.
+#[derive(Clone, Debug)]
+pub(super) struct Held {
+    pub handles: Vec<Handle>,
+    /// The largest reach of a handle, in units of the mesh.
+    reach: f64,
+    /// An edge length that most edges are shorter than.
+    edge: f32,
+    /// The surface as given.
+    given: Mesh,
+    /// That surface with its long edges halved; every other one has its vertices first.
+    start: Placed,
+    /// The distances of the present surface from the handles, as [`Placed::distances`].
+    pub distances: Vec<f32>,
+    /// Whether the surface may not be where the handles move it: edges were halved in the last frame, or something else
+    /// has changed.
+    pub is_unsettled: bool,
+}
+
+/// What is saved of the handles.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct SavedHandles {
+    handles: Vec<Handle>,
+    distances: Vec<f32>,
+    is_unsettled: bool,
+}
+
+impl Held {
+    /// Prepares a closed surface and its handles; edges longer than `longest` are halved before anything moves.
+    ///
+    /// # Errors
+    /// [`MeshError`] for a surface that is not closed.
+    pub fn new(surface: &Band, ellipsoids: &[ControlEllipsoid], longest: f64) -> Result<Self, MeshError> {
+        let walker = &surface.walker;
+        let given = Mesh::from_triangles(walker.mesh())?;
+        let bounds = Bounds::from_points(&walker.mesh().positions);
+        let mut start = Placed { mesh: given.clone(), points: identity(walker), distances: Vec::new() };
+        let most = given.vertex_count() + MOST_ADDED;
+        for _ in 0..PASSES {
+            let length = |now: &Placed, u, v| f64::from(now.mesh.position(u).distance(now.mesh.position(v)));
+            if halve_edges(&mut start, walker, |now, u, v| length(now, u, v) > longest, Mesh::split) == 0
+                || start.mesh.vertex_count() >= most
+            {
+                break;
+            }
+        }
+        let reach = REACH * f64::from(bounds.min.distance(bounds.max));
+        let mut now = start.clone();
+        let mut held = Self {
+            handles: Vec::new(),
+            reach,
+            edge: typical_edge(&start.mesh),
+            given,
+            start,
+            distances: Vec::new(),
+            is_unsettled: false,
+        };
+        for ellipsoid in ellipsoids {
+            held.add(Ellipsoid::new(ellipsoid), &mut now)?;
+        }
+        held.distances = now.distances;
+        Ok(held)
+    }
+
+    /// Returns the surface that the handles leave as it is, with its long edges halved.
+    pub fn start(&self) -> &Placed {
+        &self.start
+    }
+
+    pub fn is_at_rest(&self) -> bool {
+        self.handles.iter().all(Handle::is_at_rest)
+    }
+
+    /// Moves the handles on to poses near the present ones.
+    pub fn move_to(&mut self, poses: &[Ellipsoid]) {
+        self.handles.iter_mut().zip(poses).for_each(|(handle, &pose)| handle.move_to(pose));
+    }
+
+    /// Adds a handle that leaves the surface as it is `now` near its pose; distances from it are added to `now`.
+    ///
+    /// # Errors
+    /// [`MeshError`] if memory does not suffice.
+    pub fn add(&mut self, pose: Ellipsoid, now: &mut Placed) -> Result<(), MeshError> {
+        let gripped = gripped(&pose, &SurfaceWalker::new(now.mesh.to_triangles())?);
+        let ids: Vec<VertexId> = now.mesh.vertices().collect();
+        let at_grip = gripped.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        let motion = at_grip.and_then(|&(v, _)| self.motion_of(now, ids[v as usize]));
+        let rest = motion.map_or(pose, |motion| pose_before(&pose, &motion));
+        let (reach, found) = self.effect_of(&rest, distances_from(&gripped, now), now);
+        let mut handle = Handle::at_rest(rest, reach);
+        handle.move_to(pose);
+        let before = self.handles.len();
+        self.handles.push(handle);
+        now.distances = with_column(&now.distances, before, &found);
+        self.start.distances = with_column(&self.start.distances, before, &found[..self.start.mesh.slots()]);
+        Ok(())
+    }
+
+    /// Removes the handles from a number on; also their distances in `now`.
+    pub fn keep(&mut self, count: usize, now: &mut Placed) {
+        let before = self.handles.len();
+        for distances in [&mut now.distances, &mut self.start.distances] {
+            let kept = distances.chunks_exact(before.max(1)).flat_map(|of| &of[..count.min(of.len())]);
+            *distances = kept.copied().collect();
+        }
+        self.handles.truncate(count);
+    }
+
+    fn target(&self, now: &Placed, v: VertexId) -> Vec3 {
+        let p = now.points[v.index()].point;
+        self.motion_of(now, v).map_or(p, |motion| motion.of(p.as_dvec3()).as_vec3())
+    }
+
+    fn motion_of(&self, now: &Placed, v: VertexId) -> Option<Motion> {
+        let count = self.handles.len();
+        motion_at(&self.handles, &now.distances[v.index() * count..][..count])
+    }
+
+    /// Returns the reach of a handle, and the distance of each vertex from it, by slot: along the given surface, but at
+    /// least as large, relative to the reach, as in a straight line. The rigid part around the handle has none.
+    fn effect_of(&self, rest: &Ellipsoid, along: Vec<f32>, now: &Placed) -> (f64, Vec<f32>) {
+        let straight: Vec<f32> =
+            now.points.iter().map(|at| rest.ray_distance(at.point.as_dvec3()) as f32).collect();
+        let least = along.iter().copied().fold(f32::INFINITY, f32::min);
+        let [[along_from, along_to], [from, to]] =
+            [&along, &straight].map(|of| self.ends_of(of, f64::from(least) + RIGID * rest.shortest_axis()));
+        let share = |d: f32, from: f64, to: f64| ((f64::from(d) - from) / (to - from)).max(0.0);
+        let reach = along_to - along_from;
+        let distance =
+            |(&a, &s): (&f32, &f32)| (share(a, along_from, along_to).max(share(s, from, to)) * reach) as f32;
+        (reach, along.iter().zip(&straight).map(distance).collect())
+    }
+
+    /// Returns the distances at which the rigid part around a handle ends, at most `rigid`, and at which its effect does,
+    /// from those of the vertices, of which those of the start are first.
+    fn ends_of(&self, distances: &[f32], rigid: f64) -> [f64; 2] {
+        let mesh = &self.start.mesh;
+        let farthest = |corners: [VertexId; 3]| {
+            corners.iter().map(|v| distances[v.index()]).fold(0.0, |far, d| if d > far { d } else { far })
+        };
+        let mut parts: Vec<(f32, f64)> = mesh
+            .triangles()
+            .map(|corners| (farthest(corners), triangle::area(mesh.facet(corners).points)))
+            .collect();
+        sort_by_rank(&mut parts, |&(far, _)| rank_f32(far).into());
+        let all: f64 = parts.iter().map(|(_, area)| area).sum();
+        let [rigid_area, area] = AREAS.map(|share| {
+            let mut within = 0.0;
+            let end = parts.iter().find(|(_, area)| {
+                within += area;
+                within >= share * all
+            });
+            end.map_or(f64::INFINITY, |&(far, _)| f64::from(far))
+        });
+        let from = rigid.min(rigid_area);
+        [from, area.min(from + self.reach).max(from + 1e-6 * self.reach)]
+    }
+
+    /// Has the surface follow the handles, as [`Self::advance`] does, or back to what it is without them.
+    fn follow(
+        &mut self,
+        now: &mut Placed,
+        surface: &SurfaceWalker,
+        guard: &mut Embedding,
+        longest: f32,
+    ) -> Option<(usize, f64)> {
+        if !self.is_at_rest() {
+            return self.advance(now, surface, guard, longest);
+        }
+        let mesh = replacement(self.start.mesh.clone(), &now.mesh);
+        *now = Placed { mesh, ..self.start.clone() };
+        self.is_unsettled = false;
+        Some((0, 0.0))
+    }
+
+    /// Moves the surface to where the handles move it, as far as it does not intersect itself, and halves edges longer than
+    /// `longest` where they have stretched it. Returns the number of halved edges, and the root mean square of the
+    /// displacements, in units of the mesh; `None`, with nothing moved, if much of the surface cannot follow.
+    fn advance(
+        &mut self,
+        now: &mut Placed,
+        surface: &SurfaceWalker,
+        guard: &mut Embedding,
+        longest: f32,
+    ) -> Option<(usize, f64)> {
+        let targets: Vec<Vec3> =
+            (0..now.mesh.slots()).map(|i| self.target(now, VertexId::from_index(i))).collect();
+        let mut displacements = displacements_to(&now.mesh, &targets);
+        guard.sync_with_edge(&now.mesh, self.edge);
+        let most = (MOST_BLOCKED * now.mesh.vertex_count() as f64) as usize;
+        let moving: Vec<VertexId> =
+            now.mesh.vertices().filter(|v| displacements[v.index()] != Vec3::ZERO).collect();
+        guard.move_some_unless(&mut now.mesh, &moving, &mut displacements, most.max(LEAST_BLOCKED))?;
+        let is_stretched = |now: &Placed, u: VertexId, v: VertexId| {
+            let [p, q] = [u, v].map(|end| now.points[end.index()].point);
+            let length = targets[u.index()].distance(targets[v.index()]);
+            length > longest && length > STRETCH * p.distance(q)
+        };
+        let split = halve_edges(now, surface, is_stretched, |mesh, u, v, at| {
+            guard.attempt(mesh, |mesh| mesh.split(u, v, at))
+        });
+        // The new vertices are moved in the next frame.
+        self.is_unsettled = split > 0;
+        let sum: f64 = displacements.iter().map(|d| f64::from(d.length_squared())).sum();
+        Some((split, (sum / now.mesh.vertex_count().max(1) as f64).sqrt()))
+    }
+
+    /// Returns what is to be saved.
+    pub fn save(&self) -> SavedHandles {
+        SavedHandles {
+            handles: self.handles.clone(),
+            distances: self.distances.clone(),
+            is_unsettled: self.is_unsettled,
+        }
+    }
+
+    /// Returns a copy with saved handles, and their distances from a surface with `slots`; `None` if they do not fit.
+    pub fn restored(&self, saved: SavedHandles, slots: usize) -> Option<Self> {
+        let SavedHandles { handles, distances, is_unsettled } = saved;
+        let (count, before) = (handles.len(), self.start.mesh.slots());
+        let is_valid = count > 0
+            && handles.iter().all(Handle::is_valid)
+            && slots >= before
+            && distances.len() == slots * count
+            && distances.iter().all(|&d| d >= 0.0);
+        is_valid.then(|| {
+            let start = Placed { distances: distances[..before * count].to_vec(), ..self.start.clone() };
+            Self { handles, start, distances, is_unsettled, ..self.clone() }
+        })
+    }
+}
+
+impl MultiresolutionModel {
+    /// Advances a surface that holds itself by one frame; returns the edits made.
+    pub(super) fn held_frame(&mut self, times: &mut Times) -> Changes {
+        let mut lap = Lap::new(self.clock, times);
+        let longest = self.model_params.edge_max as f32;
+        let (mut now, Some(mut held)) = (self.take_placed(), self.held.take()) else {
+            return Changes::default();
+        };
+        let before = (self.ellipsoids.clone(), held.handles.clone());
+        let mut done = None;
+        for attempt in 0..ATTEMPTS {
+            self.ellipsoids.advance_by(libm::pow(0.5, f64::from(attempt)), STEP * held.reach);
+            held.move_to(&self.ellipsoids.now());
+            lap.end("motion");
+            done = held.follow(&mut now, &self.bands.base().walker, &mut self.guard, longest);
+            lap.end("surface");
+            if done.is_some() {
+                break;
+            }
+            (self.ellipsoids, held.handles) = before.clone();
+        }
+        let (splits, moved) = done.unwrap_or_default();
+        if done.is_none() {
+            self.ellipsoids.stop();
+            held.is_unsettled = false;
+        }
+        self.residual = moved / self.model_params.target();
+        self.put_placed(now, held);
+        self.show_held();
+        lap.end("detail");
+        Changes { creations: splits as u32, ..Changes::default() }
+    }
+
+    /// Shows the surface as given if all handles are at rest, else as they have moved it.
+    pub(super) fn show_held(&mut self) {
+        let Some(held) = &self.held else { return };
+        let (mesh, points) = if held.is_at_rest() {
+            (held.given.clone(), identity(&self.bands.base().walker))
+        } else {
+            (self.surface.clone(), self.correspondence.clone())
+        };
+        let mesh = replacement(mesh, &self.detailed.mesh);
+        self.detailed =
+            Detailed { mesh, points, unmatched_vertices: 0, held_vertices: self.detailed.held_vertices };
+    }
+
+    /// Sets the target ellipsoids of a surface that holds itself: those that are new leave it as it is, and it returns
+    /// where one is removed.
+    ///
+    /// # Errors
+    /// [`MeshError`] if memory does not suffice; nothing has changed then.
+    pub(super) fn set_handles(&mut self, given: &[ControlEllipsoid]) -> Result<(), MeshError> {
+        let Some(mut held) = self.held.clone() else { return Ok(()) };
+        let mut now = Placed {
+            mesh: self.surface.clone(),
+            points: self.correspondence.clone(),
+            distances: std::mem::take(&mut held.distances),
+        };
+        held.keep(given.len(), &mut now);
+        for added in &given[held.handles.len()..] {
+            held.add(Ellipsoid::new(added), &mut now)?;
+        }
+        held.is_unsettled = true;
+        self.ellipsoids.set_poses(given);
+        self.put_placed(now, held);
+        Ok(())
+    }
+
+    fn take_placed(&mut self) -> Placed {
+        Placed {
+            mesh: std::mem::take(&mut self.surface),
+            points: std::mem::take(&mut self.correspondence),
+            distances: self.held.as_mut().map(|held| std::mem::take(&mut held.distances)).unwrap_or_default(),
+        }
+    }
+
+    fn put_placed(&mut self, now: Placed, mut held: Held) {
+        (self.surface, self.correspondence, held.distances) = (now.mesh, now.points, now.distances);
+        self.held = Some(held);
+    }
+}
+
+/// Returns a mesh that takes the place of another, with versions beyond those of that one.
+fn replacement(mut mesh: Mesh, replaced: &Mesh) -> Mesh {
+    mesh.advance_versions_past(replaced);
+    mesh
+}
+
+/// Returns the pose in which a handle leaves the surface as it was before a motion, if it does so now.
+fn pose_before(now: &Ellipsoid, motion: &Motion) -> Ellipsoid {
+    let rotation = motion.turn.transpose() * now.rotation;
+    super::ellipsoid::Shape { center: motion.inverse_of(now.center), rotation, lengths: now.lengths }.into()
+}
+
+/// Returns the distance of each vertex from an ellipsoid along the given surface, by slot; `gripped` are the vertices around
+/// it.
+fn distances_from(gripped: &[(u32, f64)], now: &Placed) -> Vec<f32> {
+    let mesh = now.mesh.to_triangles();
+    let positions = now.mesh.vertices().map(|v| now.points[v.index()].point).collect();
+    let on_given = TriangleMesh { positions, ..mesh };
+    let found = geodesic_distances_from(&on_given, gripped);
+    let mut distances = vec![f32::INFINITY; now.mesh.slots()];
+    now.mesh.vertices().zip(found).for_each(|(v, distance)| distances[v.index()] = distance as f32);
+    distances
+}
+
+/// Returns rows of `count` numbers with one more each.
+fn with_column(rows: &[f32], count: usize, column: &[f32]) -> Vec<f32> {
+    let row = |(i, &one): (usize, &f32)| {
+        rows[i * count..][..count].iter().copied().chain(std::iter::once(one)).collect::<Vec<_>>()
+    };
+    column.iter().enumerate().flat_map(row).collect()
+}
+
+/// Halves all edges that `is_long` once, longest first, by `split`, which may refuse; returns their number. New vertices are
+/// in the middle of the edges, and on the given surface in the middle of the places of their ends: an edge is always on one
+/// of its triangles.
+fn halve_edges(
+    now: &mut Placed,
+    surface: &SurfaceWalker,
+    is_long: impl Fn(&Placed, VertexId, VertexId) -> bool,
+    mut split: impl FnMut(&mut Mesh, VertexId, VertexId, Vec3) -> Result<VertexId, EditError>,
+) -> usize {
+    let square = |(u, v): (VertexId, VertexId)| now.mesh.position(u).distance_squared(now.mesh.position(v));
+    let long = now.mesh.edges().filter(|&(u, v)| is_long(now, u, v));
+    let mut long: Vec<_> = long.map(|edge| (square(edge), edge)).collect();
+    sort_by_rank(&mut long, |&(_, (u, v))| combined_rank(u.0, v.0));
+    sort_by_rank(&mut long, |&(square, _)| (!rank_f32(square)).into());
+    let before = now.mesh.vertex_count();
+    for (_, (u, v)) in long {
+        if now.mesh.vertex_count() >= MAX_VERTICES {
+            break;
+        }
+        let middle = (now.mesh.position(u) + now.mesh.position(v)) * 0.5;
+        let Ok(w) = split(&mut now.mesh, u, v, middle) else { continue };
+        let [p, q] = [u, v].map(|end| now.points[end.index()].point);
+        let found = surface.closest((p + q) * 0.5);
+        now.points.resize(now.mesh.slots(), UNSET);
+        now.points[w.index()] =
+            found.map_or(UNSET, |found| BasePoint::at(surface, found.triangle, found.barycentric));
+        let count = now.distances.len() / (now.mesh.slots() - 1).max(1);
+        let mean =
+            |k: usize| 0.5 * (now.distances[u.index() * count + k] + now.distances[v.index() * count + k]);
+        let mean: Vec<f32> = (0..count).map(mean).collect();
+        now.distances.extend(mean);
+    }
+    now.mesh.vertex_count() - before
+}

@@ -1,0 +1,105 @@
+//! Proposes ellipsoids for a surface: balls inside that touch it on two sides, the largest first, spread over its parts.
+
+use super::ControlEllipsoid;
+use super::detail::Band;
+use crate::math::{Bounds, DVec3, Vec3, triangle};
+
+/// Number of places of the surface at which a ball inside is looked for.
+const PLACES: usize = 1500;
+/// Largest number of ellipsoids that are proposed.
+const MOST: usize = 6;
+/// Radius of an ellipsoid as a share of that of the ball that touches the surface.
+const FILL: f64 = 0.85;
+/// Least radius of a ball as a share of that of the largest, or of the diagonal of the surface, whichever is less: others
+/// are in its corners.
+const LEAST: [f64; 2] = [0.2, 0.02];
+/// Least distance between two balls as a share of the diagonal of the surface: the surface between them has to follow both.
+const APART: f64 = 0.12;
+/// Maximum number of steps in which a ball shrinks.
+const STEPS: usize = 30;
+
+/// Proposes balls inside a closed surface as handles, at least one unless it is flat everywhere.
+pub(super) fn proposed(surface: &Band) -> Vec<ControlEllipsoid> {
+    let bounds = Bounds::from_points(&surface.walker.mesh().positions);
+    let diagonal = f64::from(bounds.min.distance(bounds.max));
+    let apart = APART * diagonal;
+    let mut balls: Vec<Ball> = places(surface).filter_map(|at| inner_ball(surface, at, diagonal)).collect();
+    let largest = balls.iter().map(|ball| ball.radius).fold(0.0, f64::max);
+    let least = (LEAST[0] * largest).min(LEAST[1] * diagonal);
+    balls.retain(|ball| ball.radius >= least);
+    let mut chosen: Vec<Ball> = Vec::new();
+    while chosen.len() < MOST {
+        let best = balls.iter().filter_map(|ball| Some((ball.merit(&chosen, apart)?, ball)));
+        // Of equal ones the first, on every machine.
+        let Some((_, best)) = best.reduce(|best, other| if other.0 > best.0 { other } else { best }) else {
+            break;
+        };
+        chosen.push(*best);
+    }
+    chosen.iter().map(Ball::ellipsoid).collect()
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Ball {
+    center: DVec3,
+    radius: f64,
+}
+
+impl Ball {
+    /// Returns how much this ball adds to others: the larger and the further from them, the more; `None` if it is not
+    /// `apart` from them.
+    fn merit(&self, others: &[Self], apart: f64) -> Option<f64> {
+        let gap = |other: &Self| other.center.distance(self.center) - other.radius - self.radius;
+        let gap = others.iter().map(gap).fold(f64::INFINITY, f64::min);
+        if gap < apart {
+            return None;
+        }
+        Some(if others.is_empty() { self.radius } else { self.radius * gap })
+    }
+
+    fn ellipsoid(&self) -> ControlEllipsoid {
+        let r = FILL * self.radius;
+        ControlEllipsoid {
+            center: self.center.to_array(),
+            axes: [[r, 0.0, 0.0], [0.0, r, 0.0], [0.0, 0.0, r]],
+        }
+    }
+}
+
+/// Returns points of the surface, spread evenly over its area, with its normals there.
+fn places(surface: &Band) -> impl Iterator<Item = [Vec3; 2]> {
+    let corners = |t: usize| surface.walker.corners(t as u32);
+    let count = surface.walker.mesh().triangles.len();
+    let area: f64 = (0..count).map(|t| triangle::area(corners(t))).sum();
+    let mut passed = 0.0;
+    (0..count).filter_map(move |t| {
+        let [a, b, c] = corners(t);
+        let before = passed;
+        passed += triangle::area([a, b, c]) * PLACES as f64 / area;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        (before.floor() < passed.floor() && normal != Vec3::ZERO).then(|| [(a + b + c) / 3.0, normal])
+    })
+}
+
+/// Returns the largest ball inside the surface that touches it at a point with a normal (shrinking ball; Ma, Bae & Choi,
+/// *3D medial axis point approximation using nearest neighbors and the normal field*, 2012).
+fn inner_ball(surface: &Band, [at, normal]: [Vec3; 2], diagonal: f64) -> Option<Ball> {
+    let (p, inwards) = (at.as_dvec3(), -normal.as_dvec3());
+    let lifted = (p + inwards * (1e-5 * diagonal)).as_vec3();
+    let across = surface.walker.tree().ray_hit(lifted, -normal)?;
+    let mut ball = Ball { center: p, radius: 0.5 * across.distance };
+    for _ in 0..STEPS {
+        ball.center = p + inwards * ball.radius;
+        let nearest = surface.walker.closest(ball.center.as_vec3())?;
+        if nearest.distance >= ball.radius * (1.0 - 1e-3) {
+            return Some(ball);
+        }
+        let chord = nearest.point.as_dvec3() - p;
+        let radius = 0.5 * chord.length_squared() / chord.dot(inwards);
+        if !(radius > 0.0 && radius < ball.radius) {
+            return None;
+        }
+        ball.radius = radius;
+    }
+    None
+}
