@@ -120,7 +120,7 @@ fn outward_directions(
         Some(given) => {
             let at = subsampled(&cloud.points, positions, seed);
             let directions = at.iter().map(|&i| given[i as usize].normalize_or_zero()).collect();
-            (at, Normals { directions, parts: Vec::new(), noise: 0.0 })
+            (at, Normals { directions, noise: 0.0 })
         }
         None => {
             let at = subsampled(&cloud.points, if positions > ORIENTED { positions } else { ORIENTED }, seed);

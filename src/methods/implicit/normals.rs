@@ -24,9 +24,6 @@ const NEIGHBOURS: usize = 10;
 pub struct Normals {
     /// Unit normals, one for each point at which they were requested, pointing outwards as far as can be determined.
     pub directions: Vec<Vec3>,
-    /// The parts of the points at which they were requested that are connected, as indices into the directions: within each,
-    /// normals are consistent. Empty if normals were given.
-    pub parts: Vec<Vec<u32>>,
     /// Noise of the points: their standard deviation from the planes fitted to them, in units of their coordinates; 0
     /// if normals were given.
     pub noise: f32,
@@ -46,14 +43,13 @@ pub fn estimated_normals(points: &[Vec3], at: &[u32], spacing: f32) -> Normals {
         positions.iter().map(|&p| Plane::around(&grid, p, radius).normal).collect();
     let graph = neighbour_graph(&positions, &directions, radius);
     let mut oriented = vec![false; positions.len()];
-    let parts = connected_components(&graph);
-    for part in &parts {
+    for part in connected_components(&graph) {
         propagate(part[0], &graph, &mut directions, &mut oriented);
-        if outward_flux(&positions, &directions, part) < 0.0 {
+        if outward_flux(&positions, &directions, &part) < 0.0 {
             part.iter().for_each(|&i| directions[i as usize] = -directions[i as usize]);
         }
     }
-    Normals { directions, parts, noise: noise as f32 }
+    Normals { directions, noise: noise as f32 }
 }
 
 /// The least-squares plane of the points around a position, whose normal is an estimate of the surface normal.

@@ -12,13 +12,10 @@ pub use off_surface::{OffSurface, OffSurfaceSearch};
 
 use crate::math::order::median;
 use crate::math::{Vec3, lower};
-use quadric_fit::{QuadricFit, fitting_grid};
+use quadric_fit::{NEIGHBOURS, QuadricFit, fitting_grid};
 use serde::Serialize;
 use std::f64::consts::PI;
 
-/// Numbers of nearest points to which quadrics are fitted, to measure the noise: with few, they follow details; with more,
-/// the estimate is more exact. The smaller estimate is right.
-const NEIGHBOURS: [usize; 2] = [24, 12];
 /// Largest number of points at which quadrics are fitted to measure noise and density.
 const TRIALS: usize = 300;
 /// Number of points below which noise looks like shape.
@@ -63,6 +60,7 @@ impl Choice {
             some.filter_map(|&p| QuadricFit::around(&grid, p, count)).collect::<Vec<_>>()
         });
         let deviation = |fits: &[QuadricFit]| median(fits.iter().map(|fit| fit.deviation)).unwrap_or(0.0);
+        // With few points, quadrics follow details; with more, the estimate is more exact.
         let noise = if points.len() < FEW_POINTS { 0.0 } else { lower(deviation(&wide), deviation(&narrow)) };
         let reach = f64::from(median(wide.iter().map(|fit| fit.radius)).unwrap_or(2.0));
         let within = NEIGHBOURS[0].min(points.len()) as f64;

@@ -26,8 +26,22 @@ pub fn fitting_grid(points: &[Vec3], spacing: f64) -> PointGrid {
 
 /// Side of a cell in mean spacings: about as far as the nearest points reach that are fitted.
 const CELL: f32 = 3.0;
+/// Numbers of nearest points to which quadrics are fitted: with few, they follow noise; with many, they reach other walls.
+pub const NEIGHBOURS: [usize; 2] = [24, 12];
+/// Deviation of the fit to few points, relative to that to many, below which these are not on one surface.
+const OTHER_WALL: f32 = 0.6;
 
 impl QuadricFit {
+    /// Fits one to the surface next to a point `p` of a [`fitting_grid`]: to many points, or to few where these fit far better,
+    /// as beside a thin wall or an edge.
+    pub fn of_wall(grid: &PointGrid, p: Vec3) -> Option<Self> {
+        let [many, few] = NEIGHBOURS.map(|count| Self::around(grid, p, count));
+        match (many, few) {
+            (Some(many), Some(few)) if few.deviation < OTHER_WALL * many.deviation => Some(few),
+            (many, _) => many,
+        }
+    }
+
     /// Fits one to the `count` points of a [`fitting_grid`] that are nearest to `p`; `None` if these do not determine it.
     pub fn around(grid: &PointGrid, p: Vec3, count: usize) -> Option<Self> {
         let near = grid.nearest(p, count, grid.cell());

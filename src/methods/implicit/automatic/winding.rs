@@ -1,130 +1,146 @@
-//! Global orientation of normals: they are made consistent with the winding number that they define, which is 1 inside, 0
-//! outside and ½ at the surface, and falls along the normal (Lin, Shi & Liu, *Fast and globally consistent normal
-//! orientation based on the winding number normal consistency*, 2024).
+//! Global orientation of normals by the winding number that they define, which is 1 inside, 0 outside and ½ at the surface,
+//! and falls along the normal (Lin, Shi & Liu, *Fast and globally consistent normal orientation based on the winding number
+//! normal consistency*, 2024).
 
-use crate::math::order::{sort_by_rank, sort_distinct};
-use crate::math::{DVec3, Vec3};
-use std::f64::consts::PI;
-
-/// Largest number of parts that are flipped.
-const MOST_PARTS: usize = 64;
+use crate::math::Vec3;
+use std::f32::consts::PI;
+use wide::f32x4;
 
 /// The winding number of a surface that is known at some positions: a sum over vectors, the normals there, each as long as
 /// the area that it stands for.
 #[derive(Clone, Debug)]
 pub struct Winding {
-    positions: Vec<DVec3>,
-    vectors: Vec<DVec3>,
+    positions: Vec<Vec3>,
+    vectors: Vec<Vec3>,
+    fours: Fours,
     /// The square of the length below which distances are smoothed.
-    smoothing: f64,
+    smoothing: f32,
 }
 
 impl Winding {
-    /// Creates that of a surface with unit `normals`, which stand for `area` each; distances are smoothed below `width`.
-    pub fn new(positions: &[Vec3], normals: impl Iterator<Item = Vec3>, area: f64, width: f64) -> Self {
-        Self {
-            positions: positions.iter().map(|p| p.as_dvec3()).collect(),
-            vectors: normals.map(|n| n.as_dvec3() * area).collect(),
-            smoothing: width * width,
-        }
+    /// Creates that of a surface with `vectors` at `positions`; distances are smoothed below `width`.
+    pub fn new(positions: &[Vec3], vectors: Vec<Vec3>, width: f32) -> Self {
+        let fours = Fours { positions: in_fours(positions), vectors: in_fours(&vectors) };
+        Self { positions: positions.to_vec(), vectors, fours, smoothing: width * width }
     }
 
     /// Makes the vectors more consistent: a step of steepest descent of the squared differences of the winding number from
-    /// ½, after which each vector is turned along the negative gradient of the winding number. Distances are smoothed below `width`. Takes
-    /// time in proportion to the square of the number of positions.
-    pub fn improve(&mut self, width: f64) {
-        self.smoothing = width * width;
-        let errors: Vec<f64> =
-            self.positions.iter().map(|&x| 0.5 - self.sum(x, self.with(&self.vectors))).collect();
-        let direction: Vec<DVec3> = self.positions.iter().map(|&x| self.transposed(x, &errors)).collect();
-        let change: Vec<f64> = self.positions.iter().map(|&x| self.sum(x, self.with(&direction))).collect();
-        let squared: f64 = change.iter().map(|c| c * c).sum();
+    /// ½, after which each vector is turned along the negative gradient of the winding number. Takes time in proportion to
+    /// the square of the number of positions.
+    ///
+    /// From vectors of 0, the first step lets each point away from the positions around it: outwards, also where walls are
+    /// thin or thin parts are near each other, and propagation from neighbour to neighbour goes wrong.
+    pub fn improve(&mut self) {
+        let (values, gradients) = self.fours.winding_numbers(&self.positions, self.smoothing);
+        let errors: Vec<f32> = values.iter().map(|value| 0.5 - value).collect();
+        let direction = self.transposed(&errors);
+        let along = Fours { positions: self.fours.positions.clone(), vectors: in_fours(&direction) };
+        let (changes, turns) = along.winding_numbers(&self.positions, self.smoothing);
+        let squared: f32 = changes.iter().map(|change| change * change).sum();
         if squared > 0.0 {
-            let step = direction.iter().map(|d| d.length_squared()).sum::<f64>() / squared;
-            self.vectors.iter_mut().zip(&direction).for_each(|(v, d)| *v += *d * step);
+            let step = direction.iter().map(|d| d.length_squared()).sum::<f32>() / squared;
+            let gradients = gradients.iter().zip(turns).map(|(&before, turn)| before + turn * step);
+            let vectors = self.vectors.iter().zip(direction).map(|(&before, d)| before + d * step);
+            let turned = vectors.zip(gradients).map(|(v, gradient)| self.turned(v, gradient)).collect();
+            self.vectors = turned;
+            self.fours.vectors = in_fours(&self.vectors);
         }
-        let outwards: Vec<DVec3> = self.positions.iter().map(|&x| self.negative_gradient(x)).collect();
-        self.vectors.iter_mut().zip(outwards).for_each(|(v, n)| *v = n.normalize_or_zero() * v.length());
     }
 
-    /// Flips all vectors of one of `parts`, given as indices of the positions, as long as that brings the winding number at
-    /// all positions nearer to ½. Within a part, vectors are consistent already; those of a cavity have to point into it.
-    pub fn flip_parts(&mut self, parts: &[Vec<u32>]) {
-        if parts.is_empty() {
-            return;
-        }
-        let mut by_size: Vec<&Vec<u32>> = parts.iter().collect();
-        sort_by_rank(&mut by_size, |part| u64::MAX - part.len() as u64);
-        let mut largest: Vec<Vec<u32>> = by_size.into_iter().take(MOST_PARTS).cloned().collect();
-        largest.iter_mut().for_each(sort_distinct);
-        let of_part = |part: &Vec<u32>| -> Vec<f64> {
-            let own = || part.iter().map(|&i| (self.positions[i as usize], self.vectors[i as usize]));
-            self.positions.iter().map(|&x| self.sum(x, own())).collect()
-        };
-        let mut found: Vec<Vec<f64>> = largest.iter().map(of_part).collect();
-        let mut errors: Vec<f64> =
-            self.positions.iter().map(|&x| self.sum(x, self.with(&self.vectors)) - 0.5).collect();
-        for _ in 0..MOST_PARTS {
-            // The change of the sum of squared errors by a flip of a part.
-            let change = |own: &Vec<f64>| {
-                4.0 * errors.iter().zip(own).map(|(error, own)| own * (own - error)).sum::<f64>()
-            };
-            let changes: Vec<f64> = found.iter().map(change).collect();
-            let best =
-                (0..changes.len()).fold(0, |best, k| if changes[k] < changes[best] { k } else { best });
-            if changes.get(best).is_none_or(|&change| change >= 0.0) {
-                break;
-            }
-            errors.iter_mut().zip(&mut found[best]).for_each(|(error, own)| {
-                *error -= 2.0 * *own;
-                *own = -*own;
-            });
-            largest[best].iter().for_each(|&i| self.vectors[i as usize] = -self.vectors[i as usize]);
-        }
+    /// Turns the vector of a position along the negative gradient of the winding number there, without the term of the
+    /// vector itself, which points along it, whichever its side.
+    fn turned(&self, v: Vec3, gradient: Vec3) -> Vec3 {
+        let others = gradient - v / (self.smoothing * self.smoothing.sqrt());
+        others.normalize_or_zero() * v.length()
     }
 
     /// Returns the winding number at `x`.
-    pub fn at(&self, x: Vec3) -> f64 {
-        self.sum(x.as_dvec3(), self.with(&self.vectors))
+    pub fn at(&self, x: Vec3) -> f32 {
+        self.fours.winding_number(x, self.smoothing).0
     }
 
     /// Returns the vector at each position.
-    pub fn vectors(&self) -> &[DVec3] {
+    pub fn vectors(&self) -> &[Vec3] {
         &self.vectors
     }
 
-    /// Returns the positions with other vectors.
-    fn with<'a>(&'a self, vectors: &'a [DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> + 'a {
-        self.positions.iter().copied().zip(vectors.iter().copied())
+    /// Returns the product of `values` at the positions with the transposed matrix of the winding numbers there.
+    fn transposed(&self, values: &[f32]) -> Vec<Vec3> {
+        let smoothing = f32x4::splat(self.smoothing);
+        let values: Vec<f32x4> = values.chunks(4).map(|some| four_of(|k| some.get(k).copied())).collect();
+        let at = |x: &Vec3| {
+            let (x, mut sum) = (x.to_array().map(f32x4::splat), [f32x4::ZERO; 3]);
+            for (&p, &value) in self.fours.positions.iter().zip(&values) {
+                let offset = difference(x, p);
+                let inverse = f32x4::ONE / (dot(offset, offset) + smoothing);
+                add(&mut sum, offset, inverse * inverse.sqrt() * value);
+            }
+            total(sum) / (4.0 * PI)
+        };
+        self.positions.iter().map(at).collect()
+    }
+}
+
+/// Four vectors.
+type Four = [f32x4; 3];
+
+/// Positions with vectors in fours, for sums over four at a time; the last one is filled up with zeros.
+#[derive(Clone, Debug)]
+struct Fours {
+    positions: Vec<Four>,
+    vectors: Vec<Four>,
+}
+
+impl Fours {
+    /// Returns the winding number at positions, and its negative gradients, times 4π.
+    fn winding_numbers(&self, at: &[Vec3], smoothing: f32) -> (Vec<f32>, Vec<Vec3>) {
+        at.iter().map(|&x| self.winding_number(x, smoothing)).unzip()
     }
 
-    /// Returns the winding number at `x` that some positions with their vectors define.
-    fn sum(&self, x: DVec3, some: impl Iterator<Item = (DVec3, DVec3)>) -> f64 {
-        some.map(|(p, v)| v.dot(self.influence(p - x))).sum::<f64>() / (4.0 * PI)
+    #[inline]
+    fn winding_number(&self, x: Vec3, smoothing: f32) -> (f32, Vec3) {
+        let (x, smoothing) = (x.to_array().map(f32x4::splat), f32x4::splat(smoothing));
+        let (mut value, mut gradient) = (f32x4::ZERO, [f32x4::ZERO; 3]);
+        for (&p, &v) in self.positions.iter().zip(&self.vectors) {
+            let offset = difference(p, x);
+            let inverse = f32x4::ONE / (dot(offset, offset) + smoothing);
+            let weight = inverse * inverse.sqrt();
+            let term = dot(v, offset) * weight;
+            value += term;
+            add(&mut gradient, v, weight);
+            add(&mut gradient, offset, f32x4::splat(-3.0) * term * inverse);
+        }
+        (value.reduce_add() / (4.0 * PI), total(gradient))
     }
+}
 
-    /// Returns, of the product of `values` at the positions with the transposed matrix of [`Self::sum`], the entry at `x`.
-    fn transposed(&self, x: DVec3, values: &[f64]) -> DVec3 {
-        let terms = self.positions.iter().zip(values).map(|(p, &value)| self.influence(x - *p) * value);
-        terms.sum::<DVec3>() / (4.0 * PI)
-    }
+fn in_fours(vectors: &[Vec3]) -> Vec<Four> {
+    let four = |some: &[Vec3]| [0, 1, 2].map(|axis| four_of(|k| some.get(k).map(|v| v[axis])));
+    vectors.chunks(4).map(four).collect()
+}
 
-    fn influence(&self, offset: DVec3) -> DVec3 {
-        let squared = offset.length_squared() + self.smoothing;
-        offset / (squared * squared.sqrt())
-    }
+fn four_of(get: impl Fn(usize) -> Option<f32>) -> f32x4 {
+    f32x4::new(std::array::from_fn(|k| get(k).unwrap_or(0.0)))
+}
 
-    /// Returns the negative gradient of the winding number at a position, times 4π, without the term of the vector there,
-    /// which points along itself, whichever its side.
-    fn negative_gradient(&self, x: DVec3) -> DVec3 {
-        let others = self.positions.iter().zip(&self.vectors).filter(|&(p, _)| *p != x);
-        let terms = others.map(|(p, v)| {
-            let offset = *p - x;
-            let squared = offset.length_squared() + self.smoothing;
-            (*v - offset * (3.0 * v.dot(offset) / squared)) / (squared * squared.sqrt())
-        });
-        terms.sum()
-    }
+#[inline]
+fn difference(a: Four, b: Four) -> Four {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline]
+fn dot(a: Four, b: Four) -> f32x4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline]
+fn add(sum: &mut Four, v: Four, factor: f32x4) {
+    sum.iter_mut().zip(v).for_each(|(sum, v)| *sum += v * factor);
+}
+
+/// Returns the sum of four vectors.
+fn total(v: Four) -> Vec3 {
+    Vec3::from_array(v.map(|lanes| lanes.reduce_add()))
 }
 
 #[cfg(test)]
@@ -135,38 +151,44 @@ mod tests {
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     #[test]
-    fn normals_become_consistent_and_the_winding_number_that_of_a_ball() {
-        let positions = on_ball(300);
-        let wrong = positions.iter().zip(0..).map(|(&p, i)| p * [1.0, 1.0, -1.0][i % 3]);
-        let area = 4.0 * PI / 300.0;
-        let mut winding = Winding::new(&positions, wrong, area, 0.2);
-        for _ in 0..15 {
-            winding.improve(0.2);
-        }
-        let outwards = winding.vectors().iter().zip(&positions).filter(|(v, p)| v.dot(p.as_dvec3()) > 0.0);
-        assert_eq!(outwards.count(), 300);
-        let exact = Winding::new(&positions, positions.iter().copied(), area, 0.05);
+    fn the_winding_number_of_a_ball() {
+        let positions = on_ball(301);
+        let area = 4.0 * PI / 301.0;
+        let winding = Winding::new(&positions, positions.iter().map(|p| *p * area).collect(), 0.05);
         for (x, expected) in [(0.0, 1.0), (0.7, 1.0), (1.4, 0.0), (5.0, 0.0)] {
-            for (winding, error) in [(&winding, 0.25), (&exact, 0.1)] {
-                let found = winding.at(Vec3::X * x);
-                assert!((found - expected).abs() < error, "{x}: {found}");
+            let found = winding.at(Vec3::X * x);
+            assert!((found - expected).abs() < 0.1, "{x}: {found}");
+        }
+    }
+
+    /// From vectors of 0, and from wrong ones.
+    #[test]
+    fn vectors_come_to_point_outwards() {
+        let positions = on_ball(301);
+        for sides in [[0.0, 0.0, 0.0], [1.0, 1.0, -1.0]] {
+            let wrong = positions.iter().zip(0..).map(|(&p, i)| p * (0.04 * sides[i % 3])).collect();
+            let mut winding = Winding::new(&positions, wrong, 0.1);
+            for _ in 0..10 {
+                winding.improve();
             }
+            let outwards = winding.vectors().iter().zip(&positions).filter(|(v, p)| v.dot(**p) > 0.0);
+            assert_eq!(outwards.count(), 301);
         }
     }
 
     #[test]
-    fn parts_are_flipped_to_what_they_bound() {
-        let sphere = |count: usize, radius: f32| {
-            let area = 4.0 * PI * f64::from(radius * radius) / count as f64;
-            on_ball(count).into_iter().map(move |n| ((n * radius).as_dvec3(), n.as_dvec3() * area))
-        };
-        let (positions, vectors) = sphere(300, 1.0).chain(sphere(100, 0.5)).unzip();
-        let mut winding = Winding { positions, vectors, smoothing: 0.01 };
-        // Both outwards: the inner one bounds a ball in the ball, not a cavity.
-        winding.flip_parts(&[(300..400).collect(), (0..300).collect()]);
-        for (x, expected) in [(0.0, 0.0), (0.75, 1.0), (2.0, 0.0)] {
-            let found = winding.at(Vec3::X * x);
-            assert!((found - expected).abs() < 0.2, "{x}: {found}");
+    fn vectors_come_to_point_into_a_cavity() {
+        for radius in [0.3_f32, 0.8] {
+            let inner = on_ball((600.0 * radius * radius) as usize);
+            let positions: Vec<Vec3> =
+                on_ball(600).into_iter().chain(inner.iter().map(|&p| p * radius)).collect();
+            let mut winding = Winding::new(&positions, vec![Vec3::ZERO; positions.len()], 0.08);
+            for _ in 0..10 {
+                winding.improve();
+            }
+            let mut sides = winding.vectors().iter().zip(&positions).map(|(v, p)| v.dot(*p));
+            assert!(sides.by_ref().take(600).all(|side| side > 0.0), "{radius}");
+            assert!(sides.all(|side| side < 0.0), "{radius}");
         }
     }
 }
