@@ -30,7 +30,8 @@ pub(super) struct VoxelBox {
 }
 
 impl VoxelBox {
-    fn dims(&self) -> [usize; 3] {
+    /// Returns the numbers of voxels along x, y and z.
+    pub fn dims(&self) -> [usize; 3] {
         [0, 1, 2].map(|axis| self.ends[1][axis] - self.ends[0][axis] + 1)
     }
 
@@ -170,7 +171,7 @@ fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64]) -> Vec<f64> {
 
 /// Extends values that are known at some voxels of a box to all: each voxel takes the value of the known voxel fewest
 /// steps along the axes away. `None` if no value is known.
-fn extend_to_all(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>> {
+pub(super) fn extend_to_all(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>> {
     let mut all = known;
     let mut front: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_some()).collect();
     while !front.is_empty() {

@@ -18,13 +18,19 @@
 
 mod boundary_loss;
 mod box_sides;
+mod cavity;
+mod coarse;
 mod extremal;
 mod first;
 mod frame_tracker;
 mod labelling;
+mod lattice;
+mod motion;
+mod organ;
 mod params;
 mod presence;
 mod project;
+mod propose;
 mod region;
 mod samples;
 mod start;
@@ -37,12 +43,14 @@ pub use frame_tracker::FrameStatistics;
 pub use params::TrackingParams;
 
 use super::method::method;
+use super::slices::{Pauses, finished};
 use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::remesh::Changes;
 use crate::spatial::surface_distance;
 use crate::volume::Volume;
+use cavity::Filled;
 use frame_tracker::FrameTracker;
 use presence::Tracked;
 use project::SpaceTimeSamples;
@@ -70,6 +78,48 @@ pub enum Bounds {
     Voxels([[usize; 3]; 2]),
 }
 
+/// What [`SurfaceTracker::propose`] is told about an object.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Query {
+    /// A point in the object, in world coordinates, in a frame.
+    Point {
+        /// The point.
+        at: DVec3,
+        /// The index of the frame.
+        frame: usize,
+    },
+    /// Two corners of a box with the object, those with the least and the largest world coordinates: what moves most in it.
+    Box([DVec3; 2]),
+    /// Nothing: what moves most in the whole sequence.
+    #[default]
+    Moving,
+}
+
+/// Proposed options of a [`SurfaceTracker`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Proposal {
+    /// The first and the last voxel of the box, both inclusive, for [`Bounds::Voxels`].
+    pub bounds: [[usize; 3]; 2],
+    /// A point in the middle of the object in the first frame that has it, in world coordinates, for
+    /// [`Component::Nearest`].
+    pub component: DVec3,
+    /// The first frame that has the object.
+    pub frame: usize,
+    /// The edge threshold, in units of intensity.
+    pub threshold: f64,
+}
+
+/// What counts as inside of a cavity.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Cavity {
+    /// Dark structures within it, such as muscles in a chamber of the heart, and the furrows between those along its wall:
+    /// its volume is what clinical measurements give. Convex objects without any are as they are.
+    #[default]
+    Closed,
+    /// What is bright only, as in the paper.
+    Open,
+}
+
 /// Options to create a [`SurfaceTracker`].
 #[derive(Clone, Debug)]
 pub struct TrackingOptions {
@@ -83,6 +133,8 @@ pub struct TrackingOptions {
     /// The surface in the first frame, from which tracking starts, in world coordinates; by default it is extracted
     /// from the image.
     pub start: Option<TriangleMesh>,
+    /// What counts as inside of the tracked surface.
+    pub cavity: Cavity,
     /// The initial parameters; `threshold`, `radius` and `time_scale` are derived from the volume if they are 0.
     pub params: TrackingParams,
 }
@@ -102,6 +154,11 @@ pub struct SurfaceTracker {
     component: Component,
     /// The caller's mesh for the first frame; empty without one.
     start: Mesh,
+    cavity: Cavity,
+    /// By frame, the voxels of the region that are filled, since the cavity is closed; none before the boundary is found.
+    filled: Vec<Vec<Filled>>,
+    /// Identifies the input in saved states.
+    fingerprint: u64,
     params: TrackingParams,
     image: ImageStatistics,
     voting: BoundaryVoting,
@@ -168,7 +225,7 @@ impl SurfaceTracker {
     /// below a tenth of a voxel; [`MethodError::Mesh`] for a start that is not a closed surface, or intersects itself;
     /// [`MethodError::Volume`] if a frame does not fit into memory.
     pub fn new(options: TrackingOptions) -> Result<Self, MethodError> {
-        let TrackingOptions { volume, bounds, component, start, params } = options;
+        let TrackingOptions { volume, bounds, component, start, cavity, params } = options;
         params.validate()?;
         if volume.frames() < 2 {
             let problem = "must have at least two frames, got one";
@@ -192,6 +249,9 @@ impl SurfaceTracker {
             region,
             component,
             start,
+            cavity,
+            filled: Vec::new(),
+            fingerprint: 0,
             params: TrackingParams::default(),
             image,
             faces: Vec::new(),
@@ -206,6 +266,7 @@ impl SurfaceTracker {
             clock: || 0.0,
         };
         tracker.params = tracker.with_defaults(params)?;
+        tracker.fingerprint = tracker.input_hash();
         tracker.restart();
         Ok(tracker)
     }
@@ -242,6 +303,8 @@ impl SurfaceTracker {
 
     /// Resets the run to before its first step, with the current parameters; only the number of steps is kept.
     fn restart(&mut self) {
+        self.region.unfill(&self.filled);
+        self.filled.clear();
         self.region.threshold = self.params.threshold / self.region.quantum;
         let window = Window {
             half_width: self.params.window as usize,
@@ -377,6 +440,9 @@ impl SurfaceTracker {
         }
         if self.faces.len() < self.frames() {
             let frame = self.faces.len();
+            if frame == 0 && self.cavity == Cavity::Closed {
+                self.close_cavity();
+            }
             let faces = self.voting.faces(&self.region, frame);
             self.faces.push(faces);
             times.add("boundary", (self.clock)() - began);
@@ -389,6 +455,13 @@ impl SurfaceTracker {
         }
         self.steps = self.steps.saturating_add(1);
         Ok(self.report(changes, times))
+    }
+
+    /// Fills dark voxels within the cavity, so that they count as blood.
+    fn close_cavity(&mut self) {
+        let mut voting = BoundaryVoting::new(self.voting.window(), self.frames());
+        self.filled = finished(self.voxels_to_fill(&mut voting, &Pauses::default()));
+        self.region.fill(&self.filled);
     }
 
     /// Returns the number of frames of the volume.

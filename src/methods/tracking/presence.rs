@@ -246,7 +246,7 @@ fn rejected_share(statistics: &FrameStatistics, passes: f64) -> f64 {
 }
 
 /// Returns the voxels of the region whose centres are inside a surface, given in the working space.
-fn inside_voxels(region: &Region, surface: &TriangleMesh) -> FixedBitSet {
+pub(super) fn inside_voxels(region: &Region, surface: &TriangleMesh) -> FixedBitSet {
     let to_voxels = DAffine3::from_scale(region.spacing.recip()) * region.from_space;
     voxels_inside(
         &TriangleMesh { origin: Default::default(), ..surface.clone() }.transformed(&to_voxels),
