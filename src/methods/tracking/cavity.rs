@@ -28,6 +28,11 @@ const MIN_DEPTH: f32 = 1.25;
 /// their intensities are partly those of muscle.
 const RIM: f32 = 1.5;
 
+/// Edge threshold, in standard deviations of the noise, below which intensities are smoothed, along axes with sides of voxels
+/// up to so many times the shortest.
+const MANY_NOISES: f64 = 6.0;
+const LONGEST: f64 = 1.5;
+
 /// Highest quantised intensity of a filled voxel, which is the highest of all.
 pub(super) const MAX_FILLED: u8 = MAX_LEVEL as u8;
 
@@ -156,7 +161,10 @@ impl SurfaceTracker {
         let Some(levels) = extend_to_all(known.collect(), voxels.dims()) else { return bright };
         pauses.after(levels.len() / 64).await;
         let lattice = region.lattice();
-        let blurred = lattice.blurred(&region.frames[frame], lattice.shortest_side() * 1.5, pauses).await;
+        // Where noise is weak, smoothing would only make narrow parts darker.
+        let is_noisy = self.image.noise * MANY_NOISES > self.params.threshold;
+        let longest = if is_noisy { LONGEST * lattice.shortest_side() } else { 0.0 };
+        let blurred = lattice.blurred(&region.frames[frame], longest, pauses).await;
         for (i, level) in levels.into_iter().enumerate() {
             let voxel = region.index(voxels.at(i));
             bright[voxel] = f64::from(blurred[voxel]) > level;
