@@ -21,7 +21,9 @@ use std::time::Instant;
 use vesicle::io::parse_volume;
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::{count_self_intersections, measure};
-use vesicle::methods::tracking::{Bounds, Cavity, Component, Query, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::methods::tracking::{
+    Bounds, Cavity, Component, Query, SurfaceTracker, TrackingOptions, TrackingParams,
+};
 use vesicle::spatial::surface_distance;
 use vesicle::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
 
@@ -214,8 +216,15 @@ fn track_file(volume: &Volume, voxel: DVec3, reach: f64) {
         Bounds::Voxels([0, 3].map(|k| now(k).round().max(DVec3::ZERO).to_array().map(|x| x as usize)))
     };
     let bounds = Some(std::env::var("BOX").map_or(Bounds::World(corners), voxels));
-    let mut tracker =
-        SurfaceTracker::new(TrackingOptions { volume, bounds, component, start: None, cavity: Cavity::Open, params }).unwrap();
+    let mut tracker = SurfaceTracker::new(TrackingOptions {
+        volume,
+        bounds,
+        component,
+        start: None,
+        cavity: Cavity::Open,
+        params,
+    })
+    .unwrap();
     println!("noise {:.2}, {:?}", tracker.noise(), tracker.params());
     while !tracker.is_done() {
         let began = Instant::now();
@@ -259,7 +268,11 @@ fn track_proposed(volume: &Volume, voxel: Option<DVec3>) {
         bounds: Some(Bounds::Voxels(proposal.bounds)),
         component: Component::Nearest(proposal.component),
         start: None,
-        cavity: if std::env::var("CAVITY").is_ok_and(|cavity| cavity == "open") { Cavity::Open } else { Cavity::Closed },
+        cavity: if std::env::var("CAVITY").is_ok_and(|cavity| cavity == "open") {
+            Cavity::Open
+        } else {
+            Cavity::Closed
+        },
         params: TrackingParams { threshold, cyclic: true, ..TrackingParams::default() },
     };
     let mut tracker = SurfaceTracker::new(options).unwrap();
@@ -272,7 +285,12 @@ fn track_proposed(volume: &Volume, voxel: Option<DVec3>) {
     let volumes = tracker.volumes();
     for (frame, mesh) in tracker.meshes().iter().enumerate() {
         let m = measure(mesh);
-        println!("{frame}: {:.2} ml, genus {}, {} components", m.volume / 1e3, (2 * m.components as i64 - m.euler as i64) / 2, m.components);
+        println!(
+            "{frame}: {:.2} ml, genus {}, {} components",
+            m.volume / 1e3,
+            (2 * m.components as i64 - m.euler as i64) / 2,
+            m.components
+        );
         if let Ok(folder) = std::env::var("OUT") {
             let bytes = vesicle::io::write_mesh(mesh, vesicle::io::MeshFormat::Ply).unwrap();
             std::fs::write(format!("{folder}/frame{frame}.ply"), bytes).unwrap();
@@ -292,9 +310,8 @@ fn track_proposed(volume: &Volume, voxel: Option<DVec3>) {
 
 fn main() {
     if let Ok(point) = std::env::var("PROPOSE") {
-        let voxel = (point != "moving").then(|| {
-            DVec3::from_slice(&point.split(',').map(|x| x.parse().unwrap()).collect::<Vec<_>>())
-        });
+        let voxel = (point != "moving")
+            .then(|| DVec3::from_slice(&point.split(',').map(|x| x.parse().unwrap()).collect::<Vec<_>>()));
         for file in std::env::args().skip(1) {
             track_proposed(&parse_volume(&std::fs::read(&file).unwrap(), None).unwrap(), voxel);
         }

@@ -7,7 +7,9 @@ use std::f64::consts::PI;
 use vesicle::math::{DAffine3, DVec3, Vec3};
 use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::MethodError;
-use vesicle::methods::tracking::{Bounds, Cavity, Component, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::methods::tracking::{
+    Bounds, Cavity, Component, SurfaceTracker, TrackingOptions, TrackingParams,
+};
 use vesicle::volume::{Volume, VolumeError, VolumeInit, Voxels};
 use vesicle::warning::{Place, WarningCode};
 #[cfg(target_arch = "wasm32")]
@@ -65,7 +67,14 @@ fn balls(frames: &[Vec<Ball>], noise: f64) -> Volume {
 
 fn options(volume: Volume) -> TrackingOptions {
     let params = TrackingParams::default();
-    TrackingOptions { volume, bounds: None, component: Component::Largest, start: None, cavity: Cavity::Open, params }
+    TrackingOptions {
+        volume,
+        bounds: None,
+        component: Component::Largest,
+        start: None,
+        cavity: Cavity::Open,
+        params,
+    }
 }
 
 fn tracked(options: TrackingOptions) -> Result<SurfaceTracker, MethodError> {

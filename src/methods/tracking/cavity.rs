@@ -141,7 +141,8 @@ impl SurfaceTracker {
                 let (parts, count) = lattice.parts(bright, pauses).await;
                 let mut sizes = vec![0usize; count + 1];
                 parts.iter().filter(|&&part| part > 0).for_each(|&part| sizes[part as usize] += 1);
-                let largest = (1..=count).fold(0, |best, part| if sizes[part] > sizes[best] { part } else { best });
+                let largest =
+                    (1..=count).fold(0, |best, part| if sizes[part] > sizes[best] { part } else { best });
                 deepest(&|i| parts[i] as usize == largest)
             }
         }
@@ -155,7 +156,7 @@ impl SurfaceTracker {
         if region.is_blank(frame) {
             return bright;
         }
-        voting.ensure_levels(region, frame);
+        voting.ensure_levels(region, frame, pauses).await;
         let voxels = VoxelBox { ends: region.inner };
         let known = (0..voxels.len()).map(|i| voting.level_at(region, frame, voxels.at(i)).map(f64::from));
         let Some(levels) = extend_to_all(known.collect(), voxels.dims()) else { return bright };
@@ -185,9 +186,11 @@ async fn closed(region: &Region, frame: usize, mask: &[bool], ball: f32, pauses:
     let mut depth = depths(lattice, &blocked, pauses).await;
     depth.iter_mut().for_each(|depth| *depth -= ball);
     let dark: Vec<bool> = mask.iter().zip(&depth).map(|(is_in, depth)| !is_in && *depth > 0.0).collect();
-    let deep: Vec<bool> = dark.iter().zip(&depth).map(|(dark, depth)| *dark && *depth >= MIN_DEPTH * side).collect();
+    let deep: Vec<bool> =
+        dark.iter().zip(&depth).map(|(dark, depth)| *dark && *depth >= MIN_DEPTH * side).collect();
     let from_deep = lattice.distances(&deep, pauses).await;
-    let muscle: Vec<bool> = dark.iter().zip(&from_deep).map(|(dark, away)| *dark && *away <= RIM * side).collect();
+    let muscle: Vec<bool> =
+        dark.iter().zip(&from_deep).map(|(dark, away)| *dark && *away <= RIM * side).collect();
     let from_muscle = lattice.distances(&muscle, pauses).await;
     let blood = window.blood(ball, pauses).await;
     let mut filled = Vec::new();

@@ -37,11 +37,7 @@ impl CoarseSequence {
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if all have the same intensity; [`MethodError::Volume`] if memory does not suffice.
-    pub async fn read(
-        volume: &Volume,
-        ends: [[usize; 3]; 2],
-        pauses: &Pauses,
-    ) -> Result<Self, MethodError> {
+    pub async fn read(volume: &Volume, ends: [[usize; 3]; 2], pauses: &Pauses) -> Result<Self, MethodError> {
         let count = [0, 1, 2].map(|k| ends[1][k] - ends[0][k] + 1);
         let strides = strides(count, volume.spacing(), volume.frames());
         let lattice = Lattice {
@@ -60,7 +56,10 @@ impl CoarseSequence {
         }
         let [from, to] = intensity_quantiles(&counts);
         if from >= to {
-            return Err(MethodError::invalid("volume", "all voxels have the same intensity: nothing to track"));
+            return Err(MethodError::invalid(
+                "volume",
+                "all voxels have the same intensity: nothing to track",
+            ));
         }
         let scale = MAX_LEVEL / (to - from);
         let level = |value: f32| ((f64::from(value) - from) * scale + 0.5).clamp(0.0, MAX_LEVEL) as u8;

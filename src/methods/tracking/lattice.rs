@@ -82,7 +82,8 @@ impl Lattice {
     /// Exact but for rounding: one pass along each axis takes the minimum over its lines of the squared distance so far plus
     /// the squared distance along the axis, as the lower envelope of parabolas (Felzenszwalb & Huttenlocher 2012).
     pub async fn distances(&self, mask: &[bool], pauses: &Pauses) -> Vec<f32> {
-        let mut squares: Vec<f32> = mask.iter().map(|&is_in| if is_in { 0.0 } else { f32::INFINITY }).collect();
+        let mut squares: Vec<f32> =
+            mask.iter().map(|&is_in| if is_in { 0.0 } else { f32::INFINITY }).collect();
         for (axis, stride) in self.strides().into_iter().enumerate() {
             let count = self.dims[axis];
             let mut line = Line::new(self.spacing[axis]);

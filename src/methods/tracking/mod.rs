@@ -56,7 +56,9 @@ use presence::Tracked;
 use project::SpaceTimeSamples;
 use region::Region;
 use samples::{Falloff, SampleField};
+use std::sync::Arc;
 use vote::{BoundaryVoting, Faces, Window};
+use warnings::SurfaceFacts;
 
 /// Selects which connected surface of the first frame is tracked, if there are several.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -167,13 +169,17 @@ pub struct SurfaceTracker {
     faces: Vec<Faces>,
     frame_tracker: Option<FrameTracker>,
     /// The boundary points around the newest tracked frame in time, `None` before the first.
-    samples: Option<SpaceTimeSamples>,
+    samples: Option<Arc<SpaceTimeSamples>>,
     mesh: Mesh,
     /// The surface of each frame tracked so far.
     meshes: Vec<TriangleMesh>,
     statistics: Vec<FrameStatistics>,
+    /// The votes of windows over several frames, of the frame whose votes are those of windows within it for an attempt.
+    replaced_faces: Option<(usize, Faces)>,
     /// By frame, the mean intensities inside and outside of its surface, in steps of the quantised intensities.
     intensities_at_surface: Vec<Option<[f64; 2]>>,
+    /// What warnings tell of the surface in each frame tracked so far.
+    facts: Vec<SurfaceFacts>,
     /// `None` until it is known, NaN where it is not defined.
     cycle_closure_error: Option<f64>,
     /// The frames in which the surface of the frame before ended and another one began.
@@ -259,7 +265,9 @@ impl SurfaceTracker {
             samples: None,
             meshes: Vec::new(),
             statistics: Vec::new(),
+            replaced_faces: None,
             intensities_at_surface: Vec::new(),
+            facts: Vec::new(),
             cycle_closure_error: None,
             lost: Vec::new(),
             steps: 0,
@@ -314,10 +322,12 @@ impl SurfaceTracker {
         };
         self.voting = BoundaryVoting::new(window, self.frames());
         self.faces.clear();
+        self.replaced_faces = None;
         (self.frame_tracker, self.samples, self.cycle_closure_error) = (None, None, None);
         self.meshes.clear();
         self.statistics.clear();
         self.intensities_at_surface.clear();
+        self.facts.clear();
         self.lost.clear();
         let replaced = std::mem::replace(&mut self.mesh, self.start.clone());
         self.mesh.advance_versions_past(&replaced);
@@ -432,6 +442,16 @@ impl SurfaceTracker {
     /// [`MethodError::InvalidArgument`] if there is no boundary or no closed surface; [`MethodError::Mesh`] and
     /// [`MethodError::Volume`] if memory does not suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
+        finished(self.step_in_slices())
+    }
+
+    /// Runs one step as [`Self::step`] does, with pauses. If the future is dropped at one, [`Self::discard_step`] must be
+    /// called, and the run is as it was before the step.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub async fn step_in_slices(&mut self) -> Result<StepReport, MethodError> {
+        let pauses = Pauses::default();
         let began = (self.clock)();
         let mut times = Times::default();
         let mut changes = Changes::default();
@@ -440,17 +460,17 @@ impl SurfaceTracker {
         }
         if self.faces.len() < self.frames() {
             let frame = self.faces.len();
-            if frame == 0 && self.cavity == Cavity::Closed {
-                self.close_cavity();
+            if self.cavity == Cavity::Closed && self.filled.is_empty() {
+                self.close_cavity(&pauses).await;
             }
-            let faces = self.voting.faces(&self.region, frame);
+            let faces = self.voting.faces(&self.region, frame, &pauses).await;
             self.faces.push(faces);
             times.add("boundary", (self.clock)() - began);
         } else if self.meshes.len() < self.frames() {
-            changes = self.next_frame()?;
+            changes = self.next_frame(&pauses).await?;
             times.add("surface", (self.clock)() - began);
         } else {
-            self.close_cycle();
+            self.close_cycle(&pauses).await;
             times.add("closure", (self.clock)() - began);
         }
         self.steps = self.steps.saturating_add(1);
@@ -458,10 +478,15 @@ impl SurfaceTracker {
     }
 
     /// Fills dark voxels within the cavity, so that they count as blood.
-    fn close_cavity(&mut self) {
+    async fn close_cavity(&mut self, pauses: &Pauses) {
         let mut voting = BoundaryVoting::new(self.voting.window(), self.frames());
-        self.filled = finished(self.voxels_to_fill(&mut voting, &Pauses::default()));
+        self.filled = self.voxels_to_fill(&mut voting, pauses).await;
         self.region.fill(&self.filled);
+    }
+
+    /// Undoes what a step has changed that was dropped at a pause; see [`Self::step_in_slices`].
+    pub fn discard_step(&mut self) {
+        self.end_own_windows(false);
     }
 
     /// Returns the number of frames of the volume.
@@ -471,23 +496,23 @@ impl SurfaceTracker {
 
     /// Tracks the surface into the next frame, or extracts it where an object begins; returns the edits of the mesh. The
     /// surface is empty in frames without an object. If this fails, nothing has changed.
-    fn next_frame(&mut self) -> Result<Changes, MethodError> {
+    async fn next_frame(&mut self, pauses: &Pauses) -> Result<Changes, MethodError> {
         let (frame, space) = (self.meshes.len(), self.region.space);
         if frame == 0 {
-            self.check_boundary()?;
+            self.check_boundary(pauses).await?;
         }
         let mut last = self.mesh.clone();
         space.enter(&mut last);
         let has_surface = last.vertex_count() > 0;
         if has_surface {
-            let tracker = self.frame_tracker.take();
+            let tracker = self.frame_tracker.clone();
             let tracker =
                 tracker.unwrap_or_else(|| FrameTracker::new(measure(&last.to_triangles()).edge_mean));
-            let (edge, from) = (tracker.edge, self.samples.take());
-            let found = self.follow(&last, tracker, from.as_ref(), frame);
-            (self.frame_tracker, self.samples) = (Some(FrameTracker::new(edge)), from);
+            let (edge, from) = (tracker.edge, self.samples.clone());
+            let found = self.follow(&last, tracker, from.as_deref(), frame, pauses).await;
+            self.frame_tracker = Some(FrameTracker::new(edge));
             if let Some(found) = found {
-                return match self.extracted_instead(&found, frame)? {
+                return match self.extracted_instead(&found, frame, pauses).await? {
                     Some(instead) => Ok(self.set_begun_frame(instead)),
                     None => Ok(self.set_frame(found)),
                 };
@@ -495,7 +520,7 @@ impl SurfaceTracker {
         }
         // Nothing else begins where a caller's start ends.
         let may_begin = frame > 0 || !has_surface;
-        match if may_begin { self.begin(&last, frame)? } else { None } {
+        match if may_begin { self.begin(&last, frame, pauses).await? } else { None } {
             Some(found) => Ok(self.set_begun_frame(found)),
             None => {
                 self.set_empty_frame();
@@ -525,6 +550,7 @@ impl SurfaceTracker {
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
         self.statistics.push(space.statistics(found.statistics));
         self.intensities_at_surface.push(self.measured_intensities(self.meshes.len() - 1));
+        self.facts.push(self.measured_facts(self.meshes.len() - 1));
         found.changes
     }
 
@@ -536,33 +562,37 @@ impl SurfaceTracker {
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
         self.statistics.push(FrameStatistics::default());
         self.intensities_at_surface.push(None);
+        self.facts.push(SurfaceFacts::default());
     }
 
     /// Tracks a copy of the last frame's surface on to the first frame, and sets the cycle closure error to its mean
     /// distance from the surface there; to NaN if one of the two is empty, or the first frame has no object there.
-    fn close_cycle(&mut self) {
-        self.cycle_closure_error = Some(f64::NAN);
-        let (Some(tracker), Some(first)) = (self.frame_tracker.clone(), self.meshes.first()) else {
-            return;
-        };
+    async fn close_cycle(&mut self, pauses: &Pauses) {
+        self.cycle_closure_error = Some(self.measured_closure(pauses).await.unwrap_or(f64::NAN));
+    }
+
+    /// Returns the cycle closure error; `None` where it is not defined.
+    async fn measured_closure(&mut self, pauses: &Pauses) -> Option<f64> {
+        let (tracker, first) = (self.frame_tracker.clone()?, self.meshes.first()?);
         if first.triangles.is_empty() || self.mesh.vertex_count() == 0 {
-            return;
+            return None;
         }
         let space = self.region.space;
         let mut mesh = self.mesh.clone();
         space.enter(&mut mesh);
-        self.voting.ensure_levels(&self.region, 0);
-        let mut closed = self.tracked(mesh, tracker, self.samples.as_ref(), 0, &self.voting);
-        if closed.is_present {
-            space.leave(&mut closed.mesh);
-            let distance = surface_distance(&closed.mesh.to_triangles(), first);
-            self.cycle_closure_error = Some(distance.map_or(f64::NAN, |distance| distance.mean));
+        self.voting.ensure_levels(&self.region, 0, pauses).await;
+        let samples = self.samples.as_deref();
+        let mut closed = self.tracked(mesh, tracker, samples, 0, &self.voting, pauses).await;
+        if !closed.is_present {
+            return None;
         }
+        space.leave(&mut closed.mesh);
+        surface_distance(&closed.mesh.to_triangles(), first).ok().map(|distance| distance.mean)
     }
 
     /// Collects the boundary points around the newest tracked frame in time; `None` before the first frame is tracked.
-    fn newest_samples(&self) -> Option<SpaceTimeSamples> {
-        self.meshes.len().checked_sub(1).map(|frame| self.samples_around(frame))
+    fn newest_samples(&self) -> Option<Arc<SpaceTimeSamples>> {
+        self.meshes.len().checked_sub(1).map(|frame| Arc::new(self.samples_around(frame)))
     }
 
     /// Collects the boundary points of a frame and of those around it in time, for plane fits in that frame.

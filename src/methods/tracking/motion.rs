@@ -55,9 +55,8 @@ pub(super) async fn most_moving(
 async fn middle(sequence: &CoarseSequence, part: &[bool], pauses: &Pauses) -> Option<(usize, usize)> {
     let lattice = &sequence.lattice;
     let [low, high] = lattice.bounds(part)?;
-    let is_inside: Vec<bool> = (0..lattice.len())
-        .map(|i| (0..3).all(|k| (low[k]..=high[k]).contains(&lattice.at(i)[k])))
-        .collect();
+    let is_inside: Vec<bool> =
+        (0..lattice.len()).map(|i| (0..3).all(|k| (low[k]..=high[k]).contains(&lattice.at(i)[k]))).collect();
     let mut counts = vec![0; 256];
     for frame in &sequence.frames {
         let inside = frame.iter().zip(&is_inside).filter(|(_, is_inside)| **is_inside);

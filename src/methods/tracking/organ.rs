@@ -71,7 +71,8 @@ impl Organ {
         let core = mask_of(&parts, most_shared(&parts, count, seed)?);
         let away = self.lattice.distances(&core, pauses).await;
         let reach = REACH * self.radius + (RIM * self.lattice.shortest_side()) as f32;
-        let near: Vec<bool> = bright.iter().zip(&away).map(|(bright, away)| *bright && *away <= reach).collect();
+        let near: Vec<bool> =
+            bright.iter().zip(&away).map(|(bright, away)| *bright && *away <= reach).collect();
         let (parts, count) = self.lattice.parts(&near, pauses).await;
         Some(mask_of(&parts, most_shared(&parts, count, &core)?))
     }

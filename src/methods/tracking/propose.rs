@@ -143,12 +143,7 @@ struct Levels {
 impl Levels {
     /// Finds the levels around a voxel of a frame; `None` if no ball around it has voxels of two kinds, of which its own is
     /// the brighter.
-    async fn around(
-        sequence: &CoarseSequence,
-        voxel: usize,
-        frame: usize,
-        pauses: &Pauses,
-    ) -> Option<Self> {
+    async fn around(sequence: &CoarseSequence, voxel: usize, frame: usize, pauses: &Pauses) -> Option<Self> {
         let own = median_around(sequence, voxel, frame);
         let least = (MIN_STEP_IN_NOISE * sequence.noise).max(MIN_STEP * MAX_LEVEL);
         let mut ball = FIRST_BALL * sequence.lattice.shortest_side();
@@ -258,7 +253,8 @@ impl Found {
         let window = Window::around(sequence, voxel, WINDOW * levels.ball);
         let frames = sequence.frames.len();
         let bright = window.bright(sequence, frame, levels.level, pauses).await;
-        let (organ, mask) = Organ::around(window.lattice, &bright, window.index(sequence, voxel)?, pauses).await?;
+        let (organ, mask) =
+            Organ::around(window.lattice, &bright, window.index(sequence, voxel)?, pauses).await?;
         let mut masks = vec![None; frames];
         let mut sums = Sums::default();
         sums.add(&window, sequence, frame, [&bright, &mask], pauses).await;
@@ -276,9 +272,8 @@ impl Found {
         let depth = super::organ::depths(&window.lattice, mask, pauses).await;
         let middle = (0..depth.len()).fold(0, |best, i| if depth[i] > depth[best] { i } else { best });
         let middle = sequence.lattice.index(window.in_sequence(window.lattice.at(middle)));
-        let union: Vec<bool> = (0..window.lattice.len())
-            .map(|i| masks.iter().flatten().any(|mask| mask[i]))
-            .collect();
+        let union: Vec<bool> =
+            (0..window.lattice.len()).map(|i| masks.iter().flatten().any(|mask| mask[i])).collect();
         let ends = window.lattice.bounds(&union)?.map(|at| window.in_sequence(at));
         let [inside, outside] = sums.means()?;
         Some(Self { frame: first, middle, ends, inside, outside })
@@ -363,7 +358,8 @@ impl Window {
     /// Returns the index in the window of a voxel of the sequence; `None` if it is outside.
     fn index(&self, sequence: &CoarseSequence, voxel: usize) -> Option<usize> {
         let at = sequence.lattice.at(voxel);
-        let is_inside = (0..3).all(|k| at[k] >= self.first[k] && at[k] < self.first[k] + self.lattice.dims[k]);
+        let is_inside =
+            (0..3).all(|k| at[k] >= self.first[k] && at[k] < self.first[k] + self.lattice.dims[k]);
         is_inside.then(|| self.lattice.index([0, 1, 2].map(|k| at[k] - self.first[k])))
     }
 
@@ -378,7 +374,13 @@ impl Window {
     }
 
     /// Returns the voxels of a frame that are brighter than a level, smoothed.
-    async fn bright(&self, sequence: &CoarseSequence, frame: usize, level: f32, pauses: &Pauses) -> Vec<bool> {
+    async fn bright(
+        &self,
+        sequence: &CoarseSequence,
+        frame: usize,
+        level: f32,
+        pauses: &Pauses,
+    ) -> Vec<bool> {
         let values: Vec<u8> = self.values(sequence, frame).collect();
         let longest = BLUR * self.lattice.shortest_side();
         let blurred = self.lattice.blurred(&values, longest, pauses).await;

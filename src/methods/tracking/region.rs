@@ -407,7 +407,10 @@ fn check_extent(parameter: &'static str, counts: [usize; 3], spacing: [f64; 3]) 
 
 /// Returns the first and the last voxel whose centres are inside the bounding box, along the voxel axes, of a box in
 /// the world, clamped to the volume; at least one voxel along each axis.
-pub(super) fn voxels_around(volume: &Volume, [low, high]: [DVec3; 2]) -> Result<[[usize; 3]; 2], MethodError> {
+pub(super) fn voxels_around(
+    volume: &Volume,
+    [low, high]: [DVec3; 2],
+) -> Result<[[usize; 3]; 2], MethodError> {
     let last = volume.dims().map(|n| n - 1);
     if !low.is_finite() || !high.is_finite() || low.cmpge(high).any() {
         let problem = format!("must be finite with min < max along every axis, got min {low} and max {high}");

@@ -132,6 +132,7 @@ impl SurfaceTracker {
         (self.meshes, self.statistics) = (meshes, state.statistics);
         self.intensities_at_surface =
             (0..self.meshes.len()).map(|frame| self.measured_intensities(frame)).collect();
+        self.facts = (0..self.meshes.len()).map(|frame| self.measured_facts(frame)).collect();
         (self.cycle_closure_error, self.steps, self.lost) = (state.cycle_closure_error, state.steps, lost);
         self.frame_tracker = state.edge.map(|edge| FrameTracker::new(edge * self.region.space.scale));
         self.samples = self.newest_samples();
@@ -161,10 +162,13 @@ impl SurfaceTracker {
         };
         let is_sound = |(frame, list): (usize, &Vec<Filled>)| {
             list.is_sorted_by(|a, b| a.voxel < b.voxel)
-                && list.iter().all(|one| original(frame, one.voxel) == Some(one.before) && one.level <= MAX_FILLED)
+                && list
+                    .iter()
+                    .all(|one| original(frame, one.voxel) == Some(one.before) && one.level <= MAX_FILLED)
         };
-        let expected = if is_begun && self.cavity == Cavity::Closed { self.frames() } else { 0 };
-        filled.len() == expected && filled.iter().enumerate().all(is_sound)
+        let has_all = filled.len() == self.frames() && self.cavity == Cavity::Closed;
+        let may_lack = !is_begun || self.cavity == Cavity::Open;
+        (has_all || filled.is_empty() && may_lack) && filled.iter().enumerate().all(is_sound)
     }
 
     /// Returns a hash of the image, the box, the component and the start, by which [`Self::restore`] recognises whether
