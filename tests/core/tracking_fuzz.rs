@@ -77,14 +77,9 @@ fn random_options(random: &mut Random) -> TrackingOptions {
         0 => Component::Largest,
         _ => Component::Nearest(DVec3::splat(random.within(-10.0, 20.0))),
     };
-    TrackingOptions {
-        volume,
-        bounds,
-        component,
-        start: None,
-        cavity: Cavity::Open,
-        params: random_params(random),
-    }
+    let params = random_params(random);
+    let cavity = if random.below(2) == 0 { Cavity::Open } else { Cavity::Closed };
+    TrackingOptions { volume, bounds, component, start: None, cavity, params }
 }
 
 /// Tracks a sequence and returns the number of frames, or the error that refuses it.
