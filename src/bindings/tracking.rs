@@ -33,25 +33,30 @@ struct Tracking {
     tracker: Rc<RefCell<SurfaceTracker>>,
     /// The step under way, which borrows the tracker until it ends or is dropped.
     step: Option<Computation<Result<StepReport, MethodError>>>,
+    /// The report of a step that was ended by whoever asked for something, until a run takes it.
+    ended: Option<Result<StepReport, MethodError>>,
 }
 
 impl Tracking {
     fn new(mut tracker: SurfaceTracker) -> Self {
         tracker.set_clock(now);
-        Self { tracker: Rc::new(RefCell::new(tracker)), step: None }
+        Self { tracker: Rc::new(RefCell::new(tracker)), step: None, ended: None }
     }
 
     /// Returns the tracker, after the step that is under way.
     fn ready(&mut self) -> RefMut<'_, SurfaceTracker> {
         if let Some(step) = self.step.take() {
-            // A step that failed fails again when it is made again.
-            finished(step).ok();
+            self.ended = Some(finished(step));
         }
         self.tracker.borrow_mut()
     }
 
-    /// Does a slice of the step that is under way, or begins one; returns its report at its end.
+    /// Does a slice of the step that is under way, or begins one; returns its report at its end, or that of one that has ended
+    /// since the last slice.
     fn advance(&mut self) -> Option<Result<StepReport, MethodError>> {
+        if let Some(report) = self.ended.take() {
+            return Some(report);
+        }
         let mut step = self.step.take().unwrap_or_else(|| Box::pin(stepped(Rc::clone(&self.tracker))));
         match advance(&mut step) {
             Poll::Pending => {
@@ -64,6 +69,7 @@ impl Tracking {
 
     /// Ends the step that is under way without its result.
     fn discard(&mut self) {
+        self.ended = None;
         if self.step.take().is_some() {
             self.tracker.borrow_mut().discard_step();
         }

@@ -19,7 +19,9 @@ const SPACING: DVec3 = DVec3::new(1.0, 1.0, 4.0);
 const FRAMES: usize = 6;
 
 /// Intensities of the ball, of what is around it, and of a wall that does not move.
-const [BALL, AROUND, WALL]: [f64; 3] = [170.0, 60.0, 240.0];
+const BALL: f64 = 170.0;
+const AROUND: f64 = 60.0;
+const WALL: f64 = 240.0;
 
 /// A ball that breathes, with a dark pillar through it, beside a bright wall, in noise; in voxels of 1 × 1 × 4.
 struct Scene {
@@ -37,7 +39,7 @@ impl Scene {
                 * turn
                 * DAffine3::from_scale(SPACING),
             radii: std::array::from_fn(|t| 11.5 + 2.5 * libm::cos(TAU * t as f64 / FRAMES as f64)),
-            pillar: 2.2,
+            pillar: 3.2,
             noise: 8.0,
         }
     }
@@ -49,7 +51,7 @@ impl Scene {
 
     /// Returns the intensity at a point from the first voxel on.
     fn value(&self, t: usize, p: DVec3) -> f64 {
-        let from_axis = libm::hypot(p.x - Self::center(t).x - 3.0, p.y - Self::center(t).y - 2.0);
+        let from_axis = libm::hypot(p.x - Self::center(t).x - 4.0, p.y - Self::center(t).y - 2.0);
         match () {
             () if p.x < 4.0 => WALL,
             () if p.distance(Self::center(t)) < self.radii[t] && from_axis > self.pillar => BALL,
@@ -65,7 +67,11 @@ impl Scene {
             for i in 0..nx * ny * nz {
                 let at = DVec3::new((i % nx) as f64, (i / nx % ny) as f64, (i / (nx * ny)) as f64);
                 let parts = (0..16).map(|k| {
-                    let part = DVec3::new(f64::from(k % 2) * 0.5, f64::from(k / 2 % 2) * 0.5, f64::from(k / 4) / 4.0);
+                    let part = DVec3::new(
+                        f64::from(k % 2) * 0.5,
+                        f64::from(k / 2 % 2) * 0.5,
+                        f64::from(k / 4) / 4.0,
+                    );
                     let offset = part - DVec3::new(0.25, 0.25, 0.375);
                     self.value(t, (at + offset) * SPACING)
                 });
@@ -113,11 +119,7 @@ fn options(volume: Volume, proposal: &Proposal, cavity: Cavity) -> TrackingOptio
         component: Component::Nearest(proposal.component),
         start: None,
         cavity,
-        params: TrackingParams {
-            threshold: proposal.threshold,
-            cyclic: true,
-            ..TrackingParams::default()
-        },
+        params: TrackingParams { threshold: proposal.threshold, cyclic: true, ..TrackingParams::default() },
     }
 }
 
@@ -206,7 +208,7 @@ fn a_closed_cavity_has_the_volume_of_the_ball_and_an_open_one_a_hole() {
         // The pillar, of which windows of five voxels see a part.
         let pillar = PI * scene.pillar * scene.pillar * 2.0 * scene.radii[t];
         let missing = found.volume - open.volumes()[t];
-        assert!((0.4 * pillar..1.6 * pillar).contains(&missing), "{t} {missing} {pillar}");
+        assert!((0.3 * pillar..1.3 * pillar).contains(&missing), "{t} {missing} {pillar}");
     }
     let off = ejected(&closed.volumes()) - ejected(&truths);
     assert!(off.abs() < 0.02, "{off}");
@@ -272,7 +274,7 @@ fn steps_in_slices_pause_often_and_can_be_discarded() {
     let mut sliced = whole.clone();
     while !whole.is_done() {
         let before = sliced.save();
-        for pauses in [1, 7, 40] {
+        for pauses in [1, 2, 5] {
             let mut step = Box::pin(sliced.step_in_slices());
             for _ in 0..pauses {
                 assert!(advance(&mut step).is_pending(), "the step ended after fewer than {pauses} pauses");

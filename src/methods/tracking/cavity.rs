@@ -178,25 +178,15 @@ impl SurfaceTracker {
 /// radius.
 async fn closed(region: &Region, frame: usize, mask: &[bool], ball: f32, pauses: &Pauses) -> Vec<Filled> {
     let Some(window) = Window::around(region, frame, mask, ball) else { return Vec::new() };
-    let Window { lattice, mask, levels, .. } = &window;
-    let side = lattice.shortest_side() as f32;
-    let away = lattice.distances(mask, pauses).await;
-    // Where the centre of a ball cannot be that touches no voxel of the cavity.
-    let blocked: Vec<bool> = away.iter().map(|&away| away <= ball).collect();
-    let mut depth = depths(lattice, &blocked, pauses).await;
-    depth.iter_mut().for_each(|depth| *depth -= ball);
-    let dark: Vec<bool> = mask.iter().zip(&depth).map(|(is_in, depth)| !is_in && *depth > 0.0).collect();
-    let deep: Vec<bool> =
-        dark.iter().zip(&depth).map(|(dark, depth)| *dark && *depth >= MIN_DEPTH * side).collect();
-    let from_deep = lattice.distances(&deep, pauses).await;
-    let muscle: Vec<bool> =
-        dark.iter().zip(&from_deep).map(|(dark, away)| *dark && *away <= RIM * side).collect();
+    let (lattice, side) = (&window.lattice, window.lattice.shortest_side() as f32);
+    let depth = window.depths_below_closed(ball, pauses).await;
+    let muscle = window.muscle(&depth, pauses).await;
     let from_muscle = lattice.distances(&muscle, pauses).await;
     let blood = window.blood(ball, pauses).await;
     let mut filled = Vec::new();
     for i in (0..lattice.len()).filter(|&i| depth[i] > -0.5 * side && from_muscle[i] <= RIM * side) {
         let Some(voxel) = window.in_region(region, i) else { continue };
-        let before = levels[i];
+        let before = window.levels[i];
         // The closed surface is blurred over one voxel, as boundaries of the image are.
         let share = (0.5 + depth[i] / side).clamp(0.0, 1.0);
         let level = f32::from(before) + share * (blood[i] - f32::from(before));
@@ -243,6 +233,26 @@ impl Window {
         let at = [0, 1, 2].map(|k| at[k] as isize - self.before[k]);
         let is_inside = (0..3).all(|k| at[k] >= 0 && (at[k] as usize) < region.dims[k]);
         is_inside.then(|| region.index(at.map(|i| i as usize)))
+    }
+
+    /// Returns the depth of each voxel's centre below the surface of the cavity closed by a ball, negative outside of it.
+    async fn depths_below_closed(&self, ball: f32, pauses: &Pauses) -> Vec<f32> {
+        let away = self.lattice.distances(&self.mask, pauses).await;
+        // Where the centre of a ball cannot be that touches no voxel of the cavity.
+        let blocked: Vec<bool> = away.iter().map(|&away| away <= ball).collect();
+        let mut depth = depths(&self.lattice, &blocked, pauses).await;
+        depth.iter_mut().for_each(|depth| *depth -= ball);
+        depth
+    }
+
+    /// Returns the dark voxels within the closed cavity, but for the roughness of its surface; `depth` are those below the
+    /// closed surface.
+    async fn muscle(&self, depth: &[f32], pauses: &Pauses) -> Vec<bool> {
+        let side = self.lattice.shortest_side() as f32;
+        let is_dark = |i: usize| !self.mask[i] && depth[i] > 0.0;
+        let deep: Vec<bool> = (0..depth.len()).map(|i| is_dark(i) && depth[i] >= MIN_DEPTH * side).collect();
+        let away = self.lattice.distances(&deep, pauses).await;
+        (0..depth.len()).map(|i| is_dark(i) && away[i] <= RIM * side).collect()
     }
 
     /// Returns the mean intensity of the cavity within a ball's radius along each axis of each voxel; 0 without any.

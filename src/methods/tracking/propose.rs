@@ -80,18 +80,12 @@ impl SurfaceTracker {
         let sequence = CoarseSequence::read(&volume, ends, &pauses).await?;
         let (voxel, frame) = match query {
             Query::Point { at, frame } => (given_voxel(&sequence, &volume, at, frame)?, frame),
-            Query::Box(_) => most_moving(&sequence, "box", &pauses).await?,
-            Query::Moving => most_moving(&sequence, "volume", &pauses).await?,
-        };
-        let parameter = match query {
-            Query::Point { .. } => "point",
-            Query::Box(_) => "box",
-            Query::Moving => "volume",
+            Query::Box(_) | Query::Moving => most_moving(&sequence, parameter(query), &pauses).await?,
         };
         let levels = Levels::around(&sequence, voxel, frame, &pauses).await;
-        let levels = levels.ok_or_else(|| no_object(parameter))?;
+        let levels = levels.ok_or_else(|| no_object(query))?;
         let found = Found::followed(&sequence, voxel, frame, &levels, &pauses).await;
-        let found = found.ok_or_else(|| no_object(parameter))?;
+        let found = found.ok_or_else(|| no_object(query))?;
         Ok(Proposal {
             bounds: found.bounds(&sequence, ends),
             component: sequence.point_of(&volume, found.middle),
@@ -101,15 +95,24 @@ impl SurfaceTracker {
     }
 }
 
-fn no_object(parameter: &'static str) -> MethodError {
-    let problem = match parameter {
-        "point" => {
+/// Returns the name of what a query is about.
+fn parameter(query: Query) -> &'static str {
+    match query {
+        Query::Point { .. } => "point",
+        Query::Box(_) => "box",
+        Query::Moving => "volume",
+    }
+}
+
+fn no_object(query: Query) -> MethodError {
+    let problem = match query {
+        Query::Point { .. } => {
             "is not in a bright object with darker surroundings: give a point in the middle of one, in a frame in \
              which it is bright; dark objects cannot be tracked"
         }
         _ => "has no bright object that moves: give a point in it",
     };
-    MethodError::invalid(parameter, problem)
+    MethodError::invalid(parameter(query), problem)
 }
 
 /// Returns the voxel of a given point, after checking the point and its frame.
