@@ -9,12 +9,12 @@ use vesicle::methods::slices::{advance, finished};
 use vesicle::methods::tracking::{
     Bounds, Cavity, Component, Proposal, Query, SurfaceTracker, TrackingOptions, TrackingParams,
 };
-use vesicle::volume::{Volume, VolumeInit, Voxels};
+use vesicle::volume::{Enrichment, Volume, VolumeInit, Voxels};
 use vesicle::warning::{Place, WarningCode};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-const DIMS: [usize; 3] = [46, 42, 13];
+const DIMS: [usize; 3] = [62, 54, 14];
 const SPACING: DVec3 = DVec3::new(1.0, 1.0, 4.0);
 const FRAMES: usize = 6;
 
@@ -38,20 +38,20 @@ impl Scene {
             affine: DAffine3::from_translation(DVec3::new(30.0, -80.0, 12.0))
                 * turn
                 * DAffine3::from_scale(SPACING),
-            radii: std::array::from_fn(|t| 11.5 + 2.5 * libm::cos(TAU * t as f64 / FRAMES as f64)),
-            pillar: 3.2,
+            radii: std::array::from_fn(|t| 17.5 + 2.5 * libm::cos(TAU * t as f64 / FRAMES as f64)),
+            pillar: 4.0,
             noise: 8.0,
         }
     }
 
     /// Returns the centre of the ball in a frame, from the first voxel on.
     fn center(t: usize) -> DVec3 {
-        DVec3::new(25.0 + 0.5 * t as f64, 20.3, 24.0)
+        DVec3::new(34.0 + 0.5 * t as f64, 26.3, 26.0)
     }
 
     /// Returns the intensity at a point from the first voxel on.
     fn value(&self, t: usize, p: DVec3) -> f64 {
-        let from_axis = libm::hypot(p.x - Self::center(t).x - 4.0, p.y - Self::center(t).y - 2.0);
+        let from_axis = libm::hypot(p.x - Self::center(t).x - 6.0, p.y - Self::center(t).y - 3.0);
         match () {
             () if p.x < 4.0 => WALL,
             () if p.distance(Self::center(t)) < self.radii[t] && from_axis > self.pillar => BALL,
@@ -159,10 +159,10 @@ fn a_point_a_box_or_nothing_is_enough_for_a_proposal() {
 #[test]
 fn a_proposed_box_lies_within_a_given_one() {
     let scene = Scene { affine: DAffine3::from_scale(SPACING), ..Scene::new() };
-    let corners = [DVec3::new(10.0, 3.0, 8.0), DVec3::new(45.0, 38.0, 26.0)];
+    let corners = [DVec3::new(8.0, 3.0, 8.0), DVec3::new(60.0, 52.0, 26.0)];
     let proposal = SurfaceTracker::propose(&scene.volume(), Query::Box(corners)).unwrap();
     let [low, high] = proposal.bounds;
-    assert!(low[0] >= 10 && low[2] >= 2 && high[1] <= 38 && high[2] == 6, "{low:?} {high:?}");
+    assert!(low[0] >= 8 && low[2] >= 2 && high[1] <= 52 && high[2] == 6, "{low:?} {high:?}");
 }
 
 #[test]
@@ -174,7 +174,7 @@ fn where_nothing_can_be_proposed_the_error_says_why() {
         other => panic!("{other:?}"),
     };
     let point = |p: DVec3, frame: usize| Query::Point { at: scene.world(p), frame };
-    let dark = refusal(&volume, point(DVec3::new(12.0, 38.0, 24.0), 0));
+    let dark = refusal(&volume, point(DVec3::new(12.0, 46.0, 24.0), 0));
     assert!(dark.0 == "point" && dark.1.contains("not in a bright object"), "{dark:?}");
     let outside = refusal(&volume, point(DVec3::new(-9.0, 20.0, 24.0), 0));
     assert!(outside.0 == "point" && outside.1.contains("outside"), "{outside:?}");
@@ -182,7 +182,7 @@ fn where_nothing_can_be_proposed_the_error_says_why() {
     assert_eq!(refusal(&volume, point(Scene::center(0), FRAMES)).0, "frame");
     let far = DVec3::splat(1e4);
     assert_eq!(refusal(&volume, Query::Box([far, far + 5.0])).0, "box");
-    let still = Scene { radii: [12.0; FRAMES], pillar: 0.0, ..Scene::new() };
+    let still = Scene { radii: [16.0; FRAMES], pillar: 0.0, ..Scene::new() };
     let frame = still.volume().frame(0).unwrap();
     assert_eq!(refusal(&frame, Query::Moving).0, "volume");
     let two = Volume::from_frames(&[frame.clone(), frame], None).unwrap();
@@ -194,7 +194,8 @@ fn where_nothing_can_be_proposed_the_error_says_why() {
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn a_closed_cavity_has_the_volume_of_the_ball_and_an_open_one_a_hole() {
     let scene = Scene::new();
-    let volume = scene.volume();
+    // Slices four pixels apart are as they should be given to the tracker.
+    let volume = scene.volume().enrich_slices(None, Enrichment::Flow).unwrap();
     let at = scene.world(Scene::center(0) - DVec3::new(3.0, 2.0, 0.0));
     let proposal = SurfaceTracker::propose(&volume, Query::Point { at, frame: 0 }).unwrap();
     let closed = tracked(options(volume.clone(), &proposal, Cavity::Closed));
@@ -211,7 +212,8 @@ fn a_closed_cavity_has_the_volume_of_the_ball_and_an_open_one_a_hole() {
         assert!((0.3 * pillar..1.3 * pillar).contains(&missing), "{t} {missing} {pillar}");
     }
     let off = ejected(&closed.volumes()) - ejected(&truths);
-    assert!(off.abs() < 0.02, "{off}");
+    // Volumes of a contracted ball in slices a quarter of its radius thick are 4 % too small, closed or open.
+    assert!(off.abs() < 0.03, "{off}");
     assert!(codes(&open).contains(&WarningCode::Handles), "{:?}", codes(&open));
     assert_eq!(codes(&closed), []);
 }
@@ -298,12 +300,12 @@ fn a_box_that_cuts_the_object_and_a_volume_that_jumps_are_told() {
     let proposal = SurfaceTracker::propose(&volume, Query::Moving).unwrap();
     let mut cut = options(volume, &proposal, Cavity::Open);
     let [low, mut high] = proposal.bounds;
-    high[0] = 28;
+    high[0] = 37;
     cut.bounds = Some(Bounds::Voxels([low, high]));
     let tracker = tracked(cut);
     let warning = tracker.warnings().into_iter().find(|warning| warning.code == WarningCode::TouchesBox);
     assert_eq!(warning.map(|warning| warning.place), Some(Some(Place::Frame(0))));
-    scene.radii = [12.0, 12.0, 12.0, 9.0, 12.0, 12.0];
+    scene.radii = [18.0, 18.0, 18.0, 13.5, 18.0, 18.0];
     let volume = scene.volume();
     let tracker = tracked(options(volume, &proposal, Cavity::Open));
     println!("{:.0?}", tracker.volumes());
