@@ -117,7 +117,7 @@ impl SurfaceTracker {
             return SurfaceFacts::default();
         }
         let measured = measure(mesh);
-        let genus = (2 * measured.components as i64 - measured.euler as i64) / 2;
+        let genus = (2 * measured.components as i64 - measured.euler) / 2;
         let in_side = mesh.positions.iter().filter(|&&p| {
             let at = self.region.to_local(p * self.region.space.scale as f32);
             self.region.is_near_side(at, NEAR_SIDE)
