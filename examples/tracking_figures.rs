@@ -3,6 +3,8 @@
 //! - `<files>`: errors of enrichment on slices left out, of the 4D volumes named and of a synthetic heart.
 //! - `CENTER=x,y,z,mm <files>`: tracks the surface nearest to a voxel, in a box that extends `mm` world units from it
 //!   on all sides. `LARGEST=1` tracks the largest surface in the box instead; `OUT=<folder>` writes the meshes as PLY.
+//! - `PROPOSE=x,y,z <files>`: proposes the options from a voxel of the first frame, or with `PROPOSE=moving` from nothing,
+//!   and tracks with them; `CAVITY=open` leaves muscles in cavities out.
 //! - `TRACK=<beats>`: tracks a synthetic heart of the paper's size and compares it with its truth; `TRACK=small` one of
 //!   a few voxels.
 //!
@@ -19,7 +21,9 @@ use std::time::Instant;
 use vesicle::io::parse_volume;
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::{count_self_intersections, measure};
-use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::methods::tracking::{
+    Bounds, Cavity, Component, Query, SurfaceTracker, TrackingOptions, TrackingParams,
+};
 use vesicle::spatial::surface_distance;
 use vesicle::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
 
@@ -95,6 +99,7 @@ fn track(cine: &Cine) {
         bounds: Some(Bounds::World(cine.cavity_box())),
         component: Component::Largest,
         start: None,
+        cavity: Cavity::Open,
         params,
     };
     let mut tracker = SurfaceTracker::new(options).unwrap();
@@ -211,8 +216,15 @@ fn track_file(volume: &Volume, voxel: DVec3, reach: f64) {
         Bounds::Voxels([0, 3].map(|k| now(k).round().max(DVec3::ZERO).to_array().map(|x| x as usize)))
     };
     let bounds = Some(std::env::var("BOX").map_or(Bounds::World(corners), voxels));
-    let mut tracker =
-        SurfaceTracker::new(TrackingOptions { volume, bounds, component, start: None, params }).unwrap();
+    let mut tracker = SurfaceTracker::new(TrackingOptions {
+        volume,
+        bounds,
+        component,
+        start: None,
+        cavity: Cavity::Open,
+        params,
+    })
+    .unwrap();
     println!("noise {:.2}, {:?}", tracker.noise(), tracker.params());
     while !tracker.is_done() {
         let began = Instant::now();
@@ -239,7 +251,72 @@ fn track_file(volume: &Volume, voxel: DVec3, reach: f64) {
     println!("closes with {:.3}", tracker.cycle_closure_error().unwrap_or(f64::NAN));
 }
 
+/// Proposes the options of a tracker from a voxel, or from nothing, and tracks with them.
+fn track_proposed(volume: &Volume, voxel: Option<DVec3>) {
+    let affine = volume.affine();
+    let volume = volume.enrich_slices(None, Enrichment::Flow).unwrap();
+    let began = Instant::now();
+    let query =
+        voxel.map_or(Query::Moving, |voxel| Query::Point { at: affine.transform_point3(voxel), frame: 0 });
+    let proposal = SurfaceTracker::propose(&volume, query).unwrap();
+    let took = began.elapsed().as_secs_f64();
+    println!("{:?} x {}: proposed in {took:.2} s {proposal:?}", volume.dims(), volume.frames());
+    let began = Instant::now();
+    let threshold = std::env::var("TH").map_or(proposal.threshold, |th| th.parse().unwrap());
+    let options = TrackingOptions {
+        volume,
+        bounds: Some(Bounds::Voxels(proposal.bounds)),
+        component: Component::Nearest(proposal.component),
+        start: None,
+        cavity: if std::env::var("CAVITY").is_ok_and(|cavity| cavity == "open") {
+            Cavity::Open
+        } else {
+            Cavity::Closed
+        },
+        params: TrackingParams { threshold, cyclic: true, ..TrackingParams::default() },
+    };
+    let mut tracker = SurfaceTracker::new(options).unwrap();
+    let mut slowest = 0.0f64;
+    while !tracker.is_done() {
+        let began = Instant::now();
+        tracker.step().unwrap();
+        slowest = slowest.max(began.elapsed().as_secs_f64());
+    }
+    let volumes = tracker.volumes();
+    for (frame, mesh) in tracker.meshes().iter().enumerate() {
+        let m = measure(mesh);
+        println!(
+            "{frame}: {:.2} ml, genus {}, {} components",
+            m.volume / 1e3,
+            (2 * m.components as i64 - m.euler as i64) / 2,
+            m.components
+        );
+        if let Ok(folder) = std::env::var("OUT") {
+            let bytes = vesicle::io::write_mesh(mesh, vesicle::io::MeshFormat::Ply).unwrap();
+            std::fs::write(format!("{folder}/frame{frame}.ply"), bytes).unwrap();
+        }
+    }
+    for warning in tracker.warnings() {
+        println!("{warning:?}");
+    }
+    let [low, high] = volumes.iter().fold([f64::MAX, 0.0], |[low, high], &v| [low.min(v), high.max(v)]);
+    println!(
+        "ejected {:.1} %; tracked in {:.1} s, slowest step {slowest:.2} s, closes with {:.3}",
+        100.0 * (1.0 - low / high),
+        began.elapsed().as_secs_f64(),
+        tracker.cycle_closure_error().unwrap_or(f64::NAN)
+    );
+}
+
 fn main() {
+    if let Ok(point) = std::env::var("PROPOSE") {
+        let voxel = (point != "moving")
+            .then(|| DVec3::from_slice(&point.split(',').map(|x| x.parse().unwrap()).collect::<Vec<_>>()));
+        for file in std::env::args().skip(1) {
+            track_proposed(&parse_volume(&std::fs::read(&file).unwrap(), None).unwrap(), voxel);
+        }
+        return;
+    }
     if let Ok(name) = std::env::var("TRACK") {
         let cine = match name.as_str() {
             "small" => Cine::small(),

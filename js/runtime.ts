@@ -130,6 +130,11 @@ export class Handle<Raw extends { free(): void }> {
     return call(() => work(raw));
   }
 
+  /** Whether the object was freed. */
+  get isFreed(): boolean {
+    return this.#raw === undefined;
+  }
+
   /** Frees the object's memory in the WebAssembly module; further calls have no effect. */
   free(): void {
     const raw = this.#raw;

@@ -3,8 +3,16 @@ import type { SpaceOptions, Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { checkedSpaceOptions, frameOf, type MeshFrame, SPACE_OPTIONS } from './mesh-file.js';
 import { Handle } from './runtime.js';
-import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
-import { RawTracker, TriangleCopy } from './vesicle.js';
+import {
+  checkedSlices,
+  Runner,
+  type RunOptions,
+  runInSlices,
+  type SliceOptions,
+  type Stepper,
+  type StepReport,
+} from './stepper.js';
+import { RawProposal, RawTracker, TriangleCopy } from './vesicle.js';
 import { type Volume, volumeHandle } from './volume.js';
 import { ModelWarnings, notesOf } from './warnings.js';
 
@@ -72,8 +80,41 @@ export interface TrackingOptions {
    * extracted from the image.
    */
   start?: Mesh;
+  /**
+   * What counts as inside of the surface: with `'closed'` (the default) also dark structures within a cavity, such as
+   * papillary muscles and trabeculae, as in clinical measurements; with `'open'` only what is bright, as in the paper. States
+   * saved before there was a choice are `'open'`.
+   */
+  cavity?: 'closed' | 'open';
   /** Initial parameters: any subset; the others have their defaults, some of which are derived from the volume. */
   params?: TrackingParams;
+}
+
+/** What is known of an object, for {@link SurfaceTracker.propose}. Give `point` or `box`, or neither: what moves most. */
+export interface ObjectQuery {
+  /** A point in the object, world space. */
+  point?: Vec3;
+  /** The frame in which the point is in the object; default the first. */
+  frame?: number;
+  /** A box with the object, corners in world space: what moves most in it; the proposed box lies within it. */
+  box?: { min: Vec3; max: Vec3 };
+}
+
+/** Options proposed by {@link SurfaceTracker.propose}. */
+export interface TrackingProposal {
+  /** For the constructor of a tracker, together with the volume. */
+  options: {
+    /** Box around the object in all frames, with a margin: first and last voxel along x, y and z. */
+    voxels: { min: Vec3; max: Vec3 };
+    /** Point in the middle of the object in the first frame that has it, world space. */
+    component: Vec3;
+    params: {
+      /** Edge threshold, intensity units. */
+      threshold: number;
+    };
+  };
+  /** The first frame that has the object. */
+  frame: number;
 }
 
 /** Statistics of the surface in one tracked frame, as listed by {@link SurfaceTracker.statistics}. */
@@ -112,7 +153,7 @@ interface Statistics {
   frames: FrameStatistics[];
 }
 
-const OPTIONS = ['volume', 'box', 'voxels', 'component', 'start', 'params'];
+const OPTIONS = ['volume', 'box', 'voxels', 'component', 'start', 'cavity', 'params'];
 
 /** Duration of a frame in {@link SurfaceTracker.toGlb}, seconds, for volumes that do not define it. */
 const FRAME_SECONDS = 0.1;
@@ -129,7 +170,9 @@ const FRAME_SECONDS = 0.1;
  * In frames in which the image has no object where the surface was, the surface is empty; it begins again where an
  * object appears. {@link StepReport.warnings} names these frames (`ends-in-frame`, `begins-in-frame`), those in which the
  * object is too small for the radius of plane fits (`small-object`), and those whose intensities at the surface differ
- * too much from frames nearby (`uneven-brightness`). Voxels that are NaN or negative infinity are outside.
+ * too much from frames nearby (`uneven-brightness`); further, those that the box cuts (`touches-box`), that have handles
+ * (`handles`), with hardly a boundary (`no-boundary`), and whose volume jumps (`volume-jump`). Voxels that are NaN or negative
+ * infinity are outside.
  *
  * @throws All methods: {@link VesicleError} `freed` after {@link SurfaceTracker.free}.
  */
@@ -158,14 +201,43 @@ export class SurfaceTracker implements Stepper {
     const [box, voxels, nearest] = [corners(known.box), ends(known.voxels), point(known.component)];
     if (box && voxels) throw invalid('voxels', 'give either box or voxels, not both');
     const params = shallowCopy('params', known.params ?? {});
+    const isClosed = isClosedCavity(known.cavity);
     this.#frameSeconds = image.use((raw) => raw.frameSeconds()) || FRAME_SECONDS;
     this.#handle = new Handle('SurfaceTracker', () =>
-      image.use((raw) => new RawTracker(raw, box, voxels, nearest, triangles(known.start), params)),
+      image.use((raw) => new RawTracker(raw, box, voxels, nearest, triangles(known.start), isClosed, params)),
     );
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     this.#warnings = new ModelWarnings(known.volume.warnings, known.start?.warnings);
     this.#frame = frameOf(known.volume);
     this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of({ frame: this.frame }), this.#frame);
+  }
+
+  /**
+   * Proposes options of a tracker from a point in a bright object, such as one click, from a box, or from nothing but the
+   * sequence, yielding to the event loop between slices of work: `new SurfaceTracker({ volume, ...proposal.options })`. Slices
+   * far apart should have others inserted between them before, by {@link Volume.enrichSlices}.
+   *
+   * @param query - What is known of the object; default nothing: what moves most.
+   * @param options - `signal`: aborts the work; `budgetMs`: duration of a slice, milliseconds, default 12.
+   * @throws {@link VesicleError} `invalid-argument` with the reason why there is no proposal: naming `point` if there is no
+   *   bright object with darker surroundings, `frame`, or `box` or `volume` if nothing moves there, or there is one frame;
+   *   `too-large`; `signal.reason` when aborted.
+   */
+  static async propose(volume: Volume, query?: ObjectQuery, options?: SliceOptions): Promise<TrackingProposal> {
+    const { signal, budgetMs } = checkedSlices(options);
+    signal?.throwIfAborted();
+    const image = volumeHandle('volume', volume);
+    const known = checkProperties<ObjectQuery>('query', query, ['point', 'frame', 'box']);
+    const [at, box] = [known.point && vec3('point', known.point), corners(known.box)];
+    if (at && box) throw invalid('box', 'give either point or box, not both');
+    const frame = integer('frame', known.frame ?? 0);
+    const proposal = new Handle('SurfaceTracker', () => image.use((raw) => new RawProposal(raw, at, frame, box)));
+    try {
+      const advance = () => proposal.use((one) => one.advance() as TrackingProposal | undefined);
+      return await runInSlices(advance, signal, budgetMs);
+    } finally {
+      proposal.free();
+    }
   }
 
   /**
@@ -245,14 +317,31 @@ export class SurfaceTracker implements Stepper {
   }
 
   /**
-   * Tracks the surface to the last frame, yielding to the event loop between slices of one or more steps.
+   * Tracks the surface to the last frame, yielding to the event loop between slices of work, also within a step. Whatever is
+   * asked of the tracker meanwhile ends a step that is under way first.
    *
    * @returns The last report.
-   * @throws As {@link SurfaceTracker.step}; `signal.reason` when aborted, and the tracker stays usable; any error
-   *   thrown by `onStep`.
+   * @throws As {@link SurfaceTracker.step}; `signal.reason` when aborted, and the tracker is as after the last step that ended,
+   *   and stays usable; any error thrown by `onStep`.
    */
-  run(given?: RunOptions): Promise<StepReport> {
-    return this.#runner.run(() => this.#step(1), given);
+  async run(given?: RunOptions): Promise<StepReport> {
+    try {
+      return await this.#runner.run(() => this.#advance(), given);
+    } catch (error) {
+      if (given?.signal?.aborted) this.#discard();
+      throw error;
+    }
+  }
+
+  /** Does a slice of a step; returns its report at its end. */
+  #advance(): StepReport | undefined {
+    const report = this.#handle.use((raw) => raw.advance() as StepReport | undefined);
+    return report && this.#warnings.take(report);
+  }
+
+  /** Leaves a step that is under way, unless the tracker was freed. */
+  #discard(): void {
+    if (!this.#handle.isFreed) this.#handle.use((raw) => raw.discard());
   }
 
   #step(iterations: number): StepReport {
@@ -324,7 +413,7 @@ export class SurfaceTracker implements Stepper {
 
   /**
    * Saves the whole state except the image, for {@link SurfaceTracker.restore} of a tracker with the same volume, box,
-   * component and start.
+   * component, cavity and start.
    */
   save(): Uint8Array {
     return this.#handle.use((raw) => raw.save());
@@ -334,7 +423,7 @@ export class SurfaceTracker implements Stepper {
    * Restores a saved state, bit for bit.
    *
    * @throws {@link VesicleError} `bad-file` for bytes that are not a saved state of a tracker with the same volume,
-   *   box, component and start; the tracker then stays unchanged; `invalid-argument` while a run is in progress.
+   *   box, component, cavity and start; the tracker then stays unchanged; `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);
@@ -366,6 +455,13 @@ function ends(voxels: TrackingOptions['voxels']): Uint32Array | undefined {
   const { min, max } = checkProperties('voxels', voxels, ['min', 'max']);
   const indices = [...vec3('voxels.min', min), ...vec3('voxels.max', max)];
   return Uint32Array.from(indices, (index) => integer('voxels', index));
+}
+
+function isClosedCavity(cavity: TrackingOptions['cavity']): boolean {
+  if (cavity !== undefined && cavity !== 'closed' && cavity !== 'open') {
+    throw invalid('cavity', `must be 'closed' or 'open', got '${String(cavity)}'`);
+  }
+  return cavity !== 'open';
 }
 
 function point(component: TrackingOptions['component']): Float64Array | undefined {

@@ -8,6 +8,14 @@ export type WarningCode =
   | 'uneven-brightness'
   /** An object so small that its volume is uncertain. */
   | 'small-object'
+  /** The box in which the surface is tracked cuts the object. */
+  | 'touches-box'
+  /** A surface with handles, which most objects do not have. */
+  | 'handles'
+  /** An image without a boundary at much of the surface. */
+  | 'no-boundary'
+  /** A volume that differs too much from those of the frames beside it. */
+  | 'volume-jump'
   /** A label so thin that the volume of its surface is not that of its voxels. */
   | 'thin-label'
   /** Parts or gaps so thin that the points hardly tell them apart: topology and volume may be wrong. */

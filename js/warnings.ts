@@ -10,6 +10,7 @@ const CODES: Record<WarningCode, true> = {
   'begins-in-frame': true,
   'uneven-brightness': true,
   'small-object': true,
+  ...{ 'touches-box': true, handles: true, 'no-boundary': true, 'volume-jump': true },
   'thin-label': true,
   'thin-parts': true,
   ...{ precision: true, recentred: true, anisotropic: true, reader: true },

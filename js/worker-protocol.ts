@@ -40,7 +40,7 @@ export type Report = StepReport | number;
  * Methods that the page can abort, whose last argument is their options, with the name of the listener option that receives
  * their reports; empty if they have none.
  */
-export const ABORTABLE = { run: 'onStep', coverage: 'onProgress', create: '' } as const;
+export const ABORTABLE = { run: 'onStep', coverage: 'onProgress', create: '', propose: '' } as const;
 
 /** An error of the worker, serialised so that the page can create an equal one. */
 export type Failure =
@@ -206,7 +206,7 @@ export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N
   Mesh: { icosphere: 'method', fromArrays: 'method', parse: 'method', marchingCubes: 'method' },
   DeformableModel: { maxLevels: 'method' },
   ImplicitSurface: {},
-  SurfaceTracker: {},
+  SurfaceTracker: { propose: 'method' },
   MultiresolutionModel: {},
   LabelSurfaces: { create: 'method' },
 };

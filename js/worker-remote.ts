@@ -293,7 +293,8 @@ function remoteClass(name: ClassName): Class {
   };
   const proxy = named[name] as unknown as Class;
   for (const method of Object.keys(STATICS[name])) {
-    define(proxy, method, { value: async (...args: unknown[]) => post(currentSession(), name, method, args) });
+    const call = async (...args: unknown[]) => post(currentSession(), name, method, args);
+    define(proxy, method, { value: method === 'propose' ? propose : call });
   }
   for (const [member, kind] of Object.entries(MEMBERS[name])) define(proxy.prototype, member, memberOf(member, kind));
   // Meshes are created by static methods only.
@@ -345,6 +346,12 @@ function creator(proxy: Class, name: ClassName): (...args: unknown[]) => Promise
     await request.created;
     return object;
   };
+}
+
+/** Implements `SurfaceTracker.propose`, which can be aborted. */
+async function propose(volume: unknown, query?: unknown, options?: SliceOptions): Promise<unknown> {
+  const { signal, ...rest } = checkedSlices(options);
+  return abortable('SurfaceTracker', 'propose', [volume, query, rest], signal);
 }
 
 /** Returns the static method that creates an object in slices, which can be aborted. */

@@ -73,6 +73,14 @@ codes! {
     UnevenBrightness = "uneven-brightness",
     /// The object is so small that its volume is uncertain.
     SmallObject = "small-object",
+    /// The box in which the surface is tracked cuts the object.
+    TouchesBox = "touches-box",
+    /// The surface has handles, which most objects do not have.
+    Handles = "handles",
+    /// The image shows no boundary at much of the surface.
+    NoBoundary = "no-boundary",
+    /// The volume in this frame differs too much from those of the frames beside it.
+    VolumeJump = "volume-jump",
     /// A label is so thin that the volume of its surface is not that of its voxels.
     ThinLabel = "thin-label",
     /// Parts of the surface, or gaps between them, are so thin that the points hardly tell them apart: topology and volume

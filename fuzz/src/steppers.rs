@@ -13,7 +13,9 @@ use vesicle::methods::implicit::{
 use vesicle::methods::multires::{
     ControlEllipsoid, Energy, MultiresOptions, MultiresParams, MultiresolutionModel, Topology,
 };
-use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::methods::tracking::{
+    Bounds, Cavity, Component, SurfaceTracker, TrackingOptions, TrackingParams,
+};
 use vesicle::methods::{Auto, MethodError, deformable};
 use vesicle::volume::{Volume, VolumeInit, Voxels};
 
@@ -363,7 +365,9 @@ pub fn tracking(data: &[u8]) {
     let component = if bytes.chance(2) { Component::Nearest(bytes.point(12.0)) } else { Component::Largest };
     let start = bytes.chance(5).then(|| shape(bytes));
     let parts = start.as_ref().map_or(1, |mesh| measure(mesh).components);
-    let options = TrackingOptions { volume, bounds, component, start, params: tracking_params(bytes) };
+    let cavity = if bytes.chance(2) { Cavity::Closed } else { Cavity::Open };
+    let options =
+        TrackingOptions { volume, bounds, component, start, cavity, params: tracking_params(bytes) };
     let Ok(mut tracker) = SurfaceTracker::new(options) else { return };
     for _ in 0..200 {
         if tracker.is_done() || tracker.step().is_err() {
@@ -480,6 +484,7 @@ pub fn small_tracking() -> SurfaceTracker {
         bounds: None,
         component: Component::Largest,
         start: None,
+        cavity: Cavity::Open,
         params: TrackingParams::default(),
     };
     SurfaceTracker::new(options).unwrap()

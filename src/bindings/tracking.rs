@@ -1,28 +1,185 @@
 //! Bindings of the surface tracker.
 
-use std::cell::RefCell;
+use std::cell::{RefCell, RefMut};
+use std::future::Future;
+use std::pin::Pin;
 use std::rc::Rc;
+use std::task::Poll;
 
-use js_sys::Float64Array;
+use js_sys::{Float64Array, Uint8Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{doubles, to_js, with_overrides, write_options};
+use super::convert::{bytes, doubles, now, to_js, with_overrides, write_options};
 use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
-use super::method::{method_bindings, shared};
+use super::method;
 use super::volume::RawVolume;
 use vesicle::io::AnimationWriter;
 use vesicle::math::DVec3;
+use vesicle::mesh::TriangleMesh;
+use vesicle::methods::slices::{advance, finished};
 use vesicle::methods::tracking::{
-    Bounds, Component, FrameStatistics, SurfaceTracker, TrackingOptions, TrackingParams,
+    Bounds, Cavity, Component, FrameStatistics, Proposal, Query, SurfaceTracker, TrackingOptions,
+    TrackingParams,
 };
+use vesicle::methods::{LiveSurface, Method, MethodError, StepReport};
+
+type Computation<T> = Pin<Box<dyn Future<Output = T>>>;
+
+/// A tracker, of which a step may be under way: whatever is asked of it then ends it first, so that a step changes all or
+/// nothing for those who look.
+struct Tracking {
+    tracker: Rc<RefCell<SurfaceTracker>>,
+    /// The step under way, which borrows the tracker until it ends or is dropped.
+    step: Option<Computation<Result<StepReport, MethodError>>>,
+    /// The report of a step that was ended by whoever asked for something, until a run takes it.
+    ended: Option<Result<StepReport, MethodError>>,
+}
+
+impl Tracking {
+    fn new(mut tracker: SurfaceTracker) -> Self {
+        tracker.set_clock(now);
+        Self { tracker: Rc::new(RefCell::new(tracker)), step: None, ended: None }
+    }
+
+    /// Returns the tracker, after the step that is under way.
+    fn ready(&mut self) -> RefMut<'_, SurfaceTracker> {
+        if let Some(step) = self.step.take() {
+            self.ended = Some(finished(step));
+        }
+        self.tracker.borrow_mut()
+    }
+
+    /// Does a slice of the step that is under way, or begins one; returns its report at its end, or that of one that has ended
+    /// since the last slice.
+    fn advance(&mut self) -> Option<Result<StepReport, MethodError>> {
+        if let Some(report) = self.ended.take() {
+            return Some(report);
+        }
+        let mut step = self.step.take().unwrap_or_else(|| Box::pin(stepped(Rc::clone(&self.tracker))));
+        match advance(&mut step) {
+            Poll::Pending => {
+                self.step = Some(step);
+                None
+            }
+            Poll::Ready(report) => Some(report),
+        }
+    }
+
+    /// Ends the step that is under way without its result.
+    fn discard(&mut self) {
+        self.ended = None;
+        if self.step.take().is_some() {
+            self.tracker.borrow_mut().discard_step();
+        }
+    }
+}
+
+#[allow(
+    clippy::await_holding_refcell_ref,
+    reason = "whoever else wants the tracker ends or drops the step first"
+)]
+async fn stepped(tracker: Rc<RefCell<SurfaceTracker>>) -> Result<StepReport, MethodError> {
+    tracker.borrow_mut().step_in_slices().await
+}
+
+/// The surface of a tracker in the newest frame.
+struct LiveTracking(Rc<RefCell<Tracking>>);
+
+impl LiveSurface for LiveTracking {
+    fn surface(&self) -> TriangleMesh {
+        self.0.borrow_mut().ready().surface()
+    }
+
+    fn origin(&self) -> DVec3 {
+        LiveSurface::origin(&*self.0.borrow_mut().ready())
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        self.0.borrow_mut().ready().counts()
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        self.0.borrow_mut().ready().versions()
+    }
+}
+
+/// Options of a tracker that are being proposed in slices.
+#[wasm_bindgen]
+pub struct RawProposal(Computation<Result<Proposal, MethodError>>);
+
+#[wasm_bindgen]
+impl RawProposal {
+    /// Begins to propose options, from a `point` of an object in a frame, or else from two opposite `corners` of a box with
+    /// one, both in world space, or from nothing.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        volume: &RawVolume,
+        point: Option<Float64Array>,
+        frame: usize,
+        corners: Option<Float64Array>,
+    ) -> Result<RawProposal, JsValue> {
+        let query = match (point, corners) {
+            (Some(point), _) => Query::Point { at: DVec3::from_slice(&doubles(&point)?), frame },
+            (None, Some(corners)) => {
+                let n = doubles(&corners)?;
+                Query::Box([DVec3::from_slice(&n), DVec3::from_slice(&n[3..])])
+            }
+            (None, None) => Query::Moving,
+        };
+        Ok(RawProposal(Box::pin(SurfaceTracker::propose_in_slices(volume.0.clone(), query))))
+    }
+
+    /// Does a slice of the work; returns the `TrackingProposal` at the end, after which this must not be called any more.
+    pub fn advance(&mut self) -> Result<JsValue, JsValue> {
+        match advance(&mut self.0) {
+            Poll::Pending => Ok(JsValue::UNDEFINED),
+            Poll::Ready(proposal) => Ok(to_js(&ProposalCopy::from(proposal.map_err(Failure::from)?))?),
+        }
+    }
+}
+
+/// A proposal as JavaScript has it.
+#[derive(Serialize)]
+struct ProposalCopy {
+    options: ProposedOptions,
+    frame: usize,
+}
+
+#[derive(Serialize)]
+struct ProposedOptions {
+    voxels: VoxelEnds,
+    component: [f64; 3],
+    params: ProposedParams,
+}
+
+#[derive(Serialize)]
+struct VoxelEnds {
+    min: [usize; 3],
+    max: [usize; 3],
+}
+
+#[derive(Serialize)]
+struct ProposedParams {
+    threshold: f64,
+}
+
+impl From<Proposal> for ProposalCopy {
+    fn from(proposal: Proposal) -> Self {
+        let [min, max] = proposal.bounds;
+        let options = ProposedOptions {
+            voxels: VoxelEnds { min, max },
+            component: proposal.component.to_array(),
+            params: ProposedParams { threshold: proposal.threshold },
+        };
+        Self { options, frame: proposal.frame }
+    }
+}
 
 /// The raw handle of the TypeScript class `SurfaceTracker`, which shares the tracker with the live mesh of its surface.
 #[wasm_bindgen]
-pub struct RawTracker(Rc<RefCell<SurfaceTracker>>);
-
-method_bindings!(RawTracker, SurfaceTracker, trackingParamSpecs);
+pub struct RawTracker(Rc<RefCell<Tracking>>);
 
 #[wasm_bindgen]
 impl RawTracker {
@@ -30,7 +187,7 @@ impl RawTracker {
     /// opposite `corners` in world space, else by its first and last voxel, `voxels` (six numbers each), else the whole
     /// volume. The surface tracked is the component that contains the point `nearest`, in world space, or has the
     /// vertex nearest to it; without that point, the one that encloses the largest volume. `start` is the surface in
-    /// the first frame, by default extracted from the image. Properties of `params` replace the default parameters.
+    /// the first frame, by default extracted from the image. With `is_closed`, muscles within a cavity count as blood. Properties of `params` replace the default parameters.
     #[wasm_bindgen(constructor)]
     pub fn new(
         volume: &RawVolume,
@@ -38,6 +195,7 @@ impl RawTracker {
         voxels: Option<Vec<u32>>,
         nearest: Option<Float64Array>,
         start: Option<TriangleCopy>,
+        is_closed: bool,
         params: &JsValue,
     ) -> Result<RawTracker, JsValue> {
         let numbers = |array: Option<Float64Array>| array.as_ref().map(doubles).transpose();
@@ -49,57 +207,108 @@ impl RawTracker {
             component: numbers(nearest)?
                 .map_or(Component::Largest, |n| Component::Nearest(DVec3::from_slice(&n))),
             start: start.map(|mesh| mesh.0),
+            cavity: if is_closed { Cavity::Closed } else { Cavity::Open },
             params: with_overrides(&TrackingParams::default(), params)?,
         };
-        Ok(RawTracker(shared(SurfaceTracker::new(options))?))
+        let tracker = SurfaceTracker::new(options).map_err(Failure::from)?;
+        Ok(RawTracker(Rc::new(RefCell::new(Tracking::new(tracker)))))
+    }
+
+    /// Makes `iterations` steps, or fewer if the tracker is done before; returns the `StepReport` of the last step, with the
+    /// events of all these steps.
+    pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
+        let report = self.0.borrow_mut().ready().steps(iterations).map_err(Failure::from)?;
+        Ok(to_js(&report)?)
+    }
+
+    /// Does a slice of a step; returns its `StepReport` at its end, else undefined.
+    pub fn advance(&self) -> Result<JsValue, JsValue> {
+        let report = self.0.borrow_mut().advance().transpose().map_err(Failure::from)?;
+        report.map_or(Ok(JsValue::UNDEFINED), |report| Ok(to_js(&report)?))
+    }
+
+    /// Ends the step that is under way without its result.
+    pub fn discard(&self) {
+        self.0.borrow_mut().discard();
+    }
+
+    /// Returns the current values of all parameters, as a plain object.
+    pub fn params(&self) -> Result<JsValue, JsValue> {
+        Ok(to_js(self.0.borrow_mut().ready().params())?)
+    }
+
+    /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are validated
+    /// together before any is changed.
+    #[wasm_bindgen(js_name = setParams)]
+    pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
+        let mut tracking = self.0.borrow_mut();
+        let mut tracker = tracking.ready();
+        let params = with_overrides(tracker.params(), params)?;
+        Ok(tracker.set_params(params).map_err(Failure::from)?)
+    }
+
+    /// Returns the state of the run as bytes, without the input that the tracker was made of, from which `restore` continues
+    /// it.
+    pub fn save(&self) -> Vec<u8> {
+        self.0.borrow_mut().ready().save()
+    }
+
+    /// Replaces the run by one that `save` returned, if this tracker was made of the same input, else fails; the run then
+    /// continues with the same results, bit for bit.
+    pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
+        let state = bytes(state)?;
+        Ok(self.0.borrow_mut().ready().restore(&state).map_err(Failure::from)?)
     }
 
     /// Returns a live mesh of the surface in the newest finished frame; before the first one is finished, of the start
     /// surface if there is one, else empty.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh::live(&self.0)
+        RawMesh::live(&Rc::new(RefCell::new(LiveTracking(Rc::clone(&self.0)))))
     }
 
     /// Returns the surface of a finished frame; undefined for other frames.
     #[wasm_bindgen(js_name = meshAt)]
     pub fn mesh_at(&self, frame: usize) -> Option<RawMesh> {
-        let tracker = self.0.borrow();
+        let mut tracking = self.0.borrow_mut();
+        let tracker = tracking.ready();
         tracker.meshes().get(frame).map(|mesh| RawMesh(triangle_list(mesh.clone())))
     }
 
     /// Returns the index of the frame that the live mesh shows, the newest finished one; 0 before the first one is
     /// finished.
     pub fn frame(&self) -> usize {
-        self.0.borrow().frame()
+        self.0.borrow_mut().ready().frame()
     }
 
     /// Returns the origin in world space of the surfaces and boundary points, three numbers.
     pub fn origin(&self) -> Vec<f64> {
-        self.0.borrow().origin().to_array().to_vec()
+        self.0.borrow_mut().ready().origin().to_array().to_vec()
     }
 
     /// Returns three numbers of frames: all in the volume, those in which the image boundary has been found, and those
     /// with a tracked surface.
     pub fn counts(&self) -> Vec<u32> {
-        let tracker = self.0.borrow();
+        let mut tracking = self.0.borrow_mut();
+        let tracker = tracking.ready();
         [tracker.frames(), tracker.frames_with_boundary(), tracker.meshes().len()].map(|n| n as u32).to_vec()
     }
 
     /// Returns the boundary points of the image found in a frame, five numbers each: x, y, z relative to the
     /// origin, t in frames, and the weight by boundary votes. Empty until the boundary of the frame is found.
     pub fn boundary(&self, frame: usize) -> Vec<f32> {
-        self.0.borrow().boundary(frame).into_iter().flatten().collect()
+        self.0.borrow_mut().ready().boundary(frame).into_iter().flatten().collect()
     }
 
     /// Returns the volume that the surface encloses in each finished frame, in cubed world units.
     pub fn volumes(&self) -> Vec<f64> {
-        self.0.borrow().volumes()
+        self.0.borrow_mut().ready().volumes()
     }
 
     /// Returns further results of tracking: the standard deviation of the image noise, in intensity; for a cyclic
     /// sequence, once it is known, the cycle closure error in world units; and the statistics of each finished frame.
     pub fn statistics(&self) -> Result<JsValue, JsValue> {
-        let tracker = self.0.borrow();
+        let mut tracking = self.0.borrow_mut();
+        let tracker = tracking.ready();
         let statistics = Statistics {
             noise: tracker.noise(),
             cycle_closure_error: tracker.cycle_closure_error(),
@@ -121,10 +330,17 @@ impl RawTracker {
         unit: &str,
     ) -> Result<Vec<u8>, JsValue> {
         let mut animation = AnimationWriter::new(&write_options(notes, [space, written_as, unit]));
-        let tracker = self.0.borrow();
+        let mut tracking = self.0.borrow_mut();
+        let tracker = tracking.ready();
         tracker.meshes().iter().try_for_each(|mesh| animation.add(mesh)).map_err(Failure::from)?;
         Ok(animation.finish(frame_seconds).map_err(Failure::from)?)
     }
+}
+
+/// Returns the descriptions of the parameters, from which user interfaces build their controls.
+#[wasm_bindgen(js_name = trackingParamSpecs)]
+pub fn tracking_param_specs() -> Result<JsValue, JsValue> {
+    Ok(method::param_specs::<SurfaceTracker>()?)
 }
 
 #[derive(Serialize)]

@@ -49,6 +49,7 @@ mod tool_scales;
 mod tracking;
 mod tracking_fuzz;
 mod tracking_input;
+mod tracking_proposed;
 mod volume_files;
 mod volumes_as_found;
 mod voxel_meaning;

@@ -4,7 +4,9 @@ use super::common::cine::Cine;
 use vesicle::math::{DAffine3, DVec3, Vec3};
 use vesicle::mesh::{Measures, MeshError, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::MethodError;
-use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::methods::tracking::{
+    Bounds, Cavity, Component, SurfaceTracker, TrackingOptions, TrackingParams,
+};
 use vesicle::spatial::surface_distance;
 use vesicle::volume::{Enrichment, Volume, VolumeInit, Voxels};
 #[cfg(target_arch = "wasm32")]
@@ -19,6 +21,7 @@ fn options(cine: &Cine, volume: Volume) -> TrackingOptions {
         bounds: Some(Bounds::World(cine.cavity_box())),
         component: Component::Largest,
         start: None,
+        cavity: Cavity::Open,
         params: TrackingParams { threshold: THRESHOLD, cyclic: true, ..TrackingParams::default() },
     }
 }
@@ -220,6 +223,7 @@ fn the_box_closes_surfaces_that_continue_beyond_it_also_in_mirrored_volumes() {
                 bounds,
                 component: Component::Largest,
                 start: None,
+                cavity: Cavity::Open,
                 params,
             });
             // Up to the outer faces of the voxels at the ends.

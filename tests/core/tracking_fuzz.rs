@@ -7,7 +7,9 @@ use super::common::{Named, Random, assert_at_least, seeds};
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::{count_self_intersections, measure};
 use vesicle::methods::MethodError;
-use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::methods::tracking::{
+    Bounds, Cavity, Component, SurfaceTracker, TrackingOptions, TrackingParams,
+};
 use vesicle::volume::{Volume, VolumeInit, Voxels};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -75,7 +77,9 @@ fn random_options(random: &mut Random) -> TrackingOptions {
         0 => Component::Largest,
         _ => Component::Nearest(DVec3::splat(random.within(-10.0, 20.0))),
     };
-    TrackingOptions { volume, bounds, component, start: None, params: random_params(random) }
+    let params = random_params(random);
+    let cavity = if random.below(2) == 0 { Cavity::Open } else { Cavity::Closed };
+    TrackingOptions { volume, bounds, component, start: None, cavity, params }
 }
 
 /// Tracks a sequence and returns the number of frames, or the error that refuses it.

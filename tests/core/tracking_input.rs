@@ -7,7 +7,9 @@ use std::f64::consts::PI;
 use vesicle::math::{DAffine3, DVec3, Vec3};
 use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::MethodError;
-use vesicle::methods::tracking::{Bounds, Component, SurfaceTracker, TrackingOptions, TrackingParams};
+use vesicle::methods::tracking::{
+    Bounds, Cavity, Component, SurfaceTracker, TrackingOptions, TrackingParams,
+};
 use vesicle::volume::{Volume, VolumeError, VolumeInit, Voxels};
 use vesicle::warning::{Place, WarningCode};
 #[cfg(target_arch = "wasm32")]
@@ -65,7 +67,14 @@ fn balls(frames: &[Vec<Ball>], noise: f64) -> Volume {
 
 fn options(volume: Volume) -> TrackingOptions {
     let params = TrackingParams::default();
-    TrackingOptions { volume, bounds: None, component: Component::Largest, start: None, params }
+    TrackingOptions {
+        volume,
+        bounds: None,
+        component: Component::Largest,
+        start: None,
+        cavity: Cavity::Open,
+        params,
+    }
 }
 
 fn tracked(options: TrackingOptions) -> Result<SurfaceTracker, MethodError> {
@@ -462,6 +471,7 @@ impl Scene {
             bounds: self.has_box.then_some(Bounds::World([point - half, point + half])),
             component: if self.names_point { Component::Nearest(point) } else { Component::Largest },
             start,
+            cavity: Cavity::Open,
             params,
         })?;
         for mesh in tracker.meshes() {

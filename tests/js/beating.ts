@@ -59,3 +59,15 @@ export function pair(): Volume {
   };
   return new Volume({ data: Uint8Array.from([...frame(), ...frame()]), dims: [size, size, size, 2] });
 }
+
+/** Returns two frames of a ball with a dark pillar through it, along the third axis; voxels of side 1. */
+export function pierced(): Volume {
+  const random = randomNumbers(5);
+  const size = 24;
+  const frame = (radius: number) =>
+    paint(size, [12, 12, 12], radius, random).map((value, i) => {
+      const [x, y] = [i % size, Math.floor(i / size) % size];
+      return Math.hypot(x - 14, y - 12) < 2.2 ? Math.min(value, DARK + 2) : value;
+    });
+  return new Volume({ data: Uint8Array.from([...frame(9), ...frame(8)]), dims: [size, size, size, 2] });
+}

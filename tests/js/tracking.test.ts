@@ -11,7 +11,7 @@ import {
   type Vec3,
   Volume,
 } from '../../pkg/index.js';
-import { beating, FRAMES, LARGE, MIDDLE, pair, REACH, SECONDS, SMALL, truth } from './beating.js';
+import { beating, FRAMES, LARGE, MIDDLE, pair, pierced, REACH, SECONDS, SMALL, truth } from './beating.js';
 import { failure, HEALTHY, rejection, wrong } from './helpers.js';
 
 const volume = beating();
@@ -691,4 +691,74 @@ test('a state belongs to a volume, box and start, whatever its parameters', () =
 test('steps after the end are not counted', () => {
   const one = tracked({ volume: short });
   expect(one.step().iteration).toBe(6);
+});
+
+test('one point, a box or nothing is enough to propose options, with which the ball is tracked', async () => {
+  const at = MIDDLE.map((x, k) => x + (k === 0 ? 3 : 0)) as Vec3;
+  for (const query of [{ point: at }, { point: at, frame: 3 }, { box: REACH }, {}, undefined]) {
+    const { options, frame } = await SurfaceTracker.propose(volume, query);
+    expect(frame).toBe(0);
+    expect(apart(options.component, MIDDLE)).toBeLessThan(6);
+    expect(options.params.threshold).toBeGreaterThan(30);
+    expect(options.params.threshold).toBeLessThan(100);
+    for (const k of [0, 1, 2] as const) {
+      expect(options.voxels.min[k]).toBeLessThan(3);
+      expect(options.voxels.max[k]).toBeGreaterThan(16);
+    }
+    const one = tracker(options);
+    one.step(FRAMES + 1);
+    expect((one.volumes()[0] as number) / truth(0)).toBeGreaterThan(0.9);
+    expect((one.volumes()[0] as number) / truth(0)).toBeLessThan(1.06);
+  }
+});
+
+test('a proposal is refused with a reason, and can be aborted', async () => {
+  const refused = async (query: object) => rejection(SurfaceTracker.propose(volume, query));
+  expect(await refused({ point: REACH.min })).toMatchObject({ code: 'invalid-argument' });
+  expect((await refused({ point: REACH.min })).message).toMatch(/^point: .*bright object/);
+  expect((await refused({ point: [1e6, 0, 0] })).message).toMatch(/^point: .*outside/);
+  expect((await refused({ point: MIDDLE, frame: FRAMES })).message).toMatch(/^frame/);
+  expect((await refused({ point: MIDDLE, box: REACH })).message).toMatch(/^box/);
+  expect((await refused({ place: MIDDLE })).message).toContain('place');
+  const reason = new Error('enough');
+  await expect(SurfaceTracker.propose(volume, {}, { signal: AbortSignal.abort(reason) })).rejects.toBe(reason);
+  const abort = new AbortController();
+  setTimeout(() => abort.abort(reason), 0);
+  await expect(SurfaceTracker.propose(volume, {}, { signal: abort.signal, budgetMs: 0.1 })).rejects.toBe(reason);
+});
+
+test('muscles in a cavity are inside of it if it is closed, and states say which it was', () => {
+  expect(failure(() => tracker(wrong({ cavity: 'shut' }))).message).toMatch(/^cavity/);
+  const [closed, open] = (['closed', 'open'] as const).map((cavity) => tracker({ volume: pierced(), cavity }));
+  for (const one of [closed, open]) one?.step(3);
+  const volumes = [closed, open].map((one) => one?.volumes()[0] as number);
+  expect((volumes[0] as number) / (volumes[1] as number)).toBeGreaterThan(1.05);
+  expect(failure(() => open?.restore(closed?.save() as Uint8Array)).code).toBe('bad-file');
+  const again = tracker({ volume: pierced() });
+  again.restore(closed?.save() as Uint8Array);
+  expect(bytesOfAll(again).equals(bytesOfAll(closed as SurfaceTracker))).toBe(true);
+});
+
+test('a run yields within steps: an abort leaves the tracker as after the last step', async () => {
+  const one = tracker({ volume: short });
+  one.step(3);
+  let ticks = 0;
+  const timer = setInterval(() => {
+    ticks += 1;
+  }, 0);
+  await one.run({ maxIterations: 1, budgetMs: 0.2 });
+  clearInterval(timer);
+  expect(ticks).toBeGreaterThan(1);
+  const before = one.save();
+  const abort = new AbortController();
+  const run = one.run({ signal: abort.signal, budgetMs: 0.2 });
+  setTimeout(() => abort.abort('now'), 0);
+  await expect(run).rejects.toBe('now');
+  expect(Buffer.from(one.save()).equals(Buffer.from(before))).toBe(true);
+  await one.run();
+  expect(bytesOfAll(one).equals(bytesOfAll(tracked({ volume: short })))).toBe(true);
+  const freed = tracker({ volume: short });
+  const ended = freed.run({ budgetMs: 0.2 });
+  freed.free();
+  expect((await rejection(ended)).code).toBe('freed');
 });

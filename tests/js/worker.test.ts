@@ -171,6 +171,7 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
   tracker: async ({ SurfaceTracker, Volume }) => {
     const frames = [7, 6.5, 6].map((radius) => new Volume({ data: ballOf(24, radius), dims: DIMS }));
     const tracker = new SurfaceTracker({ volume: await Volume.fromFrames(frames), params: { window: 1 } });
+    const proposal = await SurfaceTracker.propose(await Volume.fromFrames(frames), {});
     const { phase } = await tracker.run();
     return [
       await Promise.all([
@@ -180,6 +181,7 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
         tracker.noise,
         tracker.cycleClosureError,
         tracker.statistics,
+        proposal,
       ]),
       await Promise.all([tracker.boundary(1), tracker.volumes(), tracker.toGlb(), tracker.params]),
       await (await tracker.meshAt(1)).arrays(),

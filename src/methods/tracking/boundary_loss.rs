@@ -42,10 +42,10 @@ impl FrameTracker {
     /// Treats the vertices at which the image shows no boundary: collapses sheets between walls that have met, grows
     /// the surface into bright regions, and smooths the rest. Counts these vertices in `statistics`, and returns the
     /// numbers of edits of the mesh.
-    pub fn resolve_boundary_loss(
+    pub async fn resolve_boundary_loss(
         &mut self,
         mesh: &mut Mesh,
-        context: &FrameContext,
+        context: &FrameContext<'_>,
         statistics: &mut FrameStatistics,
     ) -> Changes {
         let mut changes = Changes::default();
@@ -68,13 +68,14 @@ impl FrameTracker {
             }
             for _ in 0..MOVES {
                 grown.extend(self.move_without_boundary(mesh, context));
+                context.pauses.after(mesh.slots()).await;
             }
         }
         // Growing has brought these vertices near points of the boundary.
         let grown: Vec<VertexId> = grown.into_iter().filter(|&v| mesh.is_live(v)).collect();
         if !grown.is_empty() {
             let no_offsets = vec![Vec3::ZERO; mesh.slots()];
-            self.project(mesh, &grown, &no_offsets, context, Onto::Frame, statistics);
+            self.project(mesh, &grown, &no_offsets, context, Onto::Frame, statistics).await;
         }
         changes
     }

@@ -7,7 +7,7 @@ use super::region::Region;
 use super::vote::{Face, Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
 use crate::math::order::sort_distinct;
-use std::cell::OnceCell;
+use crate::methods::slices::Pauses;
 
 impl Region {
     fn is_inside(&self, at: [usize; 3]) -> bool {
@@ -59,54 +59,55 @@ impl Region {
         (!is_inside).then_some((z * ny + y) * nx + x)
     }
 
+    /// Returns whether a position is beyond the sides of the box, or up to `near` voxels before one of them.
+    pub fn is_near_side(&self, position: DVec3, near: f64) -> bool {
+        let [first, last] = self.inner.map(|at| DVec3::from(at.map(|i| i as f64)));
+        let at = position / self.spacing;
+        at.cmplt(first - 0.5 + near).any() || at.cmpgt(last + 0.5 - near).any()
+    }
+
     /// Removes the faces beyond the box from `faces`, and adds faces of weight 1 in the sides of the box where the
     /// frame is bright, so that the surface is closed there.
-    pub fn clip_to_box(&self, frame: usize, faces: &mut Faces) {
+    pub async fn clip_to_box(&self, frame: usize, faces: &mut Faces, pauses: &Pauses) {
         for (direction, list) in faces.iter_mut().enumerate() {
             list.retain(|face| {
                 self.voxels_at_face(direction, face.voxel).iter().all(|&at| self.is_inside(at))
             });
         }
-        // Used for sides that no wall crosses: there, the nearest wall decides.
-        let fallback = OnceCell::new();
-        let fallback = || {
-            fallback
-                .get_or_init(|| label_bright_by_level(self, frame, faces, VoxelBox { ends: self.inner }))
-                .as_deref()
-        };
-        let added = [X, Y, Z].map(|direction| {
+        let mut added: [Vec<Face>; 3] = Default::default();
+        for (direction, list) in added.iter_mut().enumerate() {
             let [first, last] = self.inner.map(|at| at[direction]);
-            let mut list = Vec::new();
             // A face is indexed by the voxel before it.
             if let Some(before) = first.checked_sub(1) {
-                list.extend(self.box_side_faces(frame, faces, direction, [first, before], fallback));
+                list.extend(self.box_side_faces(frame, faces, direction, [first, before], pauses).await);
             }
             if last + 1 < self.dims[direction] {
-                list.extend(self.box_side_faces(frame, faces, direction, [last; 2], fallback));
+                list.extend(self.box_side_faces(frame, faces, direction, [last; 2], pauses).await);
             }
-            list
-        });
+        }
         faces.iter_mut().zip(added).for_each(|(list, added)| list.extend(added));
     }
 
     /// Returns faces of weight 1 in a side of the box where the adjacent `layer` of voxels is bright; `at` is the layer
-    /// of the voxels before the faces. Both are indices along `direction`. `fallback` labels the voxels of the box as
-    /// bright or dark if no boundary crosses the side.
-    fn box_side_faces<'a>(
+    /// of the voxels before the faces. Both are indices along `direction`. If no boundary crosses the side, the nearest wall
+    /// in the box decides.
+    async fn box_side_faces(
         &self,
         frame: usize,
         faces: &Faces,
         direction: usize,
         [layer, at]: [usize; 2],
-        fallback: impl Fn() -> Option<&'a [bool]>,
+        pauses: &Pauses,
     ) -> Vec<Face> {
         let mut side = VoxelBox { ends: self.inner };
         side.ends.iter_mut().for_each(|end| end[direction] = layer);
         let inner = VoxelBox { ends: self.inner };
-        let own = label_bright(self, frame, faces, side);
-        let is_bright = |i: &usize| match &own {
-            Some(own) => own[*i],
-            None => inner.index(side.at(*i)).zip(fallback()).is_some_and(|(i, fallback)| fallback[i]),
+        let own = label_bright(self, frame, faces, side, pauses).await;
+        let fallback = if own.is_none() { label_bright_by_level(self, frame, faces, inner) } else { None };
+        let is_bright = |i: &usize| match (&own, &fallback) {
+            (Some(own), _) => own[*i],
+            (None, Some(fallback)) => inner.index(side.at(*i)).is_some_and(|i| fallback[i]),
+            (None, None) => false,
         };
         let [nx, ny, _] = self.dims;
         let bright = (0..side.len()).filter(is_bright);

@@ -9,6 +9,7 @@ use super::vote::{Faces, X, Y, Z};
 use crate::math::{DAffine3, DVec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
+use crate::methods::slices::Pauses;
 use crate::volume::{Grid, marching_cubes};
 
 /// Half-width of the band around the boundary points in which the distance from the planes fitted to them is used, as a
@@ -27,19 +28,20 @@ struct Oriented {
 
 /// Extracts the closed surfaces around all bright regions of a frame, in the working space; an empty mesh if
 /// the image has no boundary.
-pub(super) fn extract_bright_surface(
+pub(super) async fn extract_bright_surface(
     region: &Region,
     frame: usize,
     faces: &Faces,
     falloff: Falloff,
+    pauses: &Pauses,
 ) -> Result<TriangleMesh, MethodError> {
     let part = VoxelBox { ends: region.inner };
-    let Some(is_bright) = label_bright(region, frame, faces, part) else {
+    let Some(is_bright) = label_bright(region, frame, faces, part, pauses).await else {
         return Ok(TriangleMesh::default());
     };
-    let points = oriented(region, frame, faces, falloff);
+    let points = oriented(region, frame, faces, falloff, pauses).await;
     let band = BAND * falloff.radius;
-    let distance = signed_distances(region, &points, band);
+    let distance = signed_distances(region, &points, band, pauses).await;
     let value = |i: usize| {
         let at = region.voxel(i as u32);
         let side = if part.index(at).is_some_and(|i| is_bright[i]) { band } else { -band };
@@ -56,7 +58,13 @@ pub(super) fn extract_bright_surface(
 /// Returns the centres of the faces that separate bright from dark in a frame, those with a weight of at least
 /// [`MIN_WEIGHT`], with the normals of the planes fitted around them, oriented towards falling intensity, or outwards
 /// in the sides of the box.
-fn oriented(region: &Region, frame: usize, faces: &Faces, falloff: Falloff) -> Vec<Oriented> {
+async fn oriented(
+    region: &Region,
+    frame: usize,
+    faces: &Faces,
+    falloff: Falloff,
+    pauses: &Pauses,
+) -> Vec<Oriented> {
     let field = SampleField::single_frame(region, falloff, faces);
     let mut points = Vec::new();
     for direction in [X, Y, Z] {
@@ -68,6 +76,7 @@ fn oriented(region: &Region, frame: usize, faces: &Faces, falloff: Falloff) -> V
                 .unwrap_or_else(|| -rising_direction(region, frame, region.voxel(face.voxel)));
             let normal = if fit.normal.dot(out) < 0.0 { -fit.normal } else { fit.normal };
             points.push(Oriented { at, normal, weight: f64::from(face.weight) });
+            pauses.after(1).await;
         }
     }
     points
@@ -98,7 +107,12 @@ fn rising_direction(region: &Region, frame: usize, voxel: [usize; 3]) -> DVec3 {
 /// Returns for each voxel within `band` of boundary points the weighted mean of its signed distances to the planes
 /// through these points, positive inside; `None` for other voxels. The surface of the frame is
 /// the zero level of these distances.
-fn signed_distances(region: &Region, points: &[Oriented], band: f64) -> Vec<Option<f64>> {
+async fn signed_distances(
+    region: &Region,
+    points: &[Oriented],
+    band: f64,
+    pauses: &Pauses,
+) -> Vec<Option<f64>> {
     let [nx, ny, nz] = region.dims;
     let mut sums = vec![(0.0f64, 0.0f64); nx * ny * nz];
     for point in points {
@@ -121,6 +135,7 @@ fn signed_distances(region: &Region, points: &[Oriented], band: f64) -> Vec<Opti
                 }
             }
         }
+        pauses.after(1).await;
     }
     sums.into_iter().map(|(sum, total)| (total > 0.0).then(|| sum / total)).collect()
 }

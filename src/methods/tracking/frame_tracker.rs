@@ -7,6 +7,7 @@ use super::region::Region;
 use super::vote::BoundaryVoting;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId, curvature, measure};
+use crate::methods::slices::Pauses;
 use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
 use serde::{Deserialize, Serialize};
 
@@ -71,6 +72,7 @@ pub(super) struct FrameContext<'a> {
     pub samples: &'a SpaceTimeSamples,
     /// The boundary votes, with the level between bright and dark in each window of `frame`.
     pub voting: &'a BoundaryVoting,
+    pub pauses: &'a Pauses,
 }
 
 /// How the image classifies a point of the surface: on a boundary, or if there is none, whether both sides are bright.
@@ -127,25 +129,26 @@ impl FrameTracker {
     /// Moves the mesh into the frame of `context`. If the parameters say so, it starts from the displacements predicted
     /// from `from`, the boundary points around the frame before, `None` in the first frame. Returns the edits of the
     /// mesh and the statistics of the frame.
-    pub fn track_frame(
+    pub async fn track_frame(
         &mut self,
         mesh: &mut Mesh,
         from: Option<&SpaceTimeSamples>,
-        context: &FrameContext,
+        context: &FrameContext<'_>,
     ) -> (Changes, FrameStatistics) {
         let mut statistics = FrameStatistics::default();
         let bound = |share: f64| (share * self.edge) as f32;
         self.bounds = EdgeBounds { min: bound(context.params.edge_min), max: bound(context.params.edge_max) };
         let mut changes = Changes::default();
         let mut predicted = match from {
-            Some(from) if context.params.prediction => prediction(mesh, context.region, from),
+            Some(from) if context.params.prediction => prediction(mesh, context, from).await,
             _ => vec![Vec3::ZERO; mesh.slots()],
         };
         for _ in 0..if from.is_some() { 1 } else { FIRST_FRAME_PASSES } {
-            changes += self.project_and_restructure(mesh, predicted, context, &mut statistics);
+            changes += self.project_and_restructure(mesh, predicted, context, &mut statistics).await;
             predicted = vec![Vec3::ZERO; mesh.slots()];
         }
         self.correct_curvature_bias(mesh, context, &mut statistics);
+        context.pauses.after(mesh.slots()).await;
         statistics.folded = self.unfold(mesh);
         let measured = measure(&mesh.to_triangles());
         (statistics.volume, statistics.area, statistics.triangles) =
@@ -156,18 +159,19 @@ impl FrameTracker {
     /// Projects the mesh, displaced by `offsets` (indexed by vertex slot), onto the extremal surface of the boundary
     /// points of a frame, restores its edge bounds, and treats the vertices at which the image shows no boundary.
     /// Returns the edits of the mesh.
-    fn project_and_restructure(
+    async fn project_and_restructure(
         &mut self,
         mesh: &mut Mesh,
         offsets: Vec<Vec3>,
-        context: &FrameContext,
+        context: &FrameContext<'_>,
         statistics: &mut FrameStatistics,
     ) -> Changes {
         let mut changes = Changes::default();
-        self.project_all(mesh, &offsets, context, Onto::SpaceTime, statistics);
+        self.project_all(mesh, &offsets, context, Onto::SpaceTime, statistics).await;
         changes += restructure(mesh, self.bounds, &mut self.guard);
-        self.project_all(mesh, &tangential_displacements(mesh), context, Onto::Frame, statistics);
-        changes += self.resolve_boundary_loss(mesh, context, statistics);
+        context.pauses.after(mesh.slots()).await;
+        self.project_all(mesh, &tangential_displacements(mesh), context, Onto::Frame, statistics).await;
+        changes += self.resolve_boundary_loss(mesh, context, statistics).await;
         changes
     }
 
@@ -218,16 +222,16 @@ impl FrameTracker {
     /// Projects all vertices, each displaced by `offsets` (by vertex slot) first, onto the extremal surface of the
     /// boundary points. Adds the mean number of steps per vertex to `statistics.steps`, and sets
     /// `statistics.mean_final_correction`.
-    fn project_all(
+    async fn project_all(
         &mut self,
         mesh: &mut Mesh,
         offsets: &[Vec3],
-        context: &FrameContext,
+        context: &FrameContext<'_>,
         onto: Onto,
         statistics: &mut FrameStatistics,
     ) {
         let all: Vec<VertexId> = mesh.vertices().collect();
-        let (steps, total) = self.project(mesh, &all, offsets, context, onto, statistics);
+        let (steps, total) = self.project(mesh, &all, offsets, context, onto, statistics).await;
         let count = all.len().max(1) as f64;
         statistics.steps += steps as f64 / count;
         statistics.mean_final_correction = total / count;
@@ -237,12 +241,12 @@ impl FrameTracker {
     /// boundary points of a frame. A vertex whose projection fails moves by the mean of its neighbours' displacements.
     /// All vertices move at once, with one collision test. Returns the total number of projection steps, and the total
     /// displacement by the projections.
-    pub(super) fn project(
+    pub(super) async fn project(
         &mut self,
         mesh: &mut Mesh,
         vertices: &[VertexId],
         offsets: &[Vec3],
-        context: &FrameContext,
+        context: &FrameContext<'_>,
         onto: Onto,
         statistics: &mut FrameStatistics,
     ) -> (usize, f64) {
@@ -259,10 +263,12 @@ impl FrameTracker {
             displacements[v.index()] = Some(to - mesh.position(v));
             steps += count;
             sum += f64::from(to.distance(from));
+            context.pauses.after(count).await;
         }
         statistics.rejected += rejected.len();
         let filled_displacements = fill_rejected(mesh, &displacements, &rejected);
         statistics.held_moves += self.move_vertices(mesh, filled_displacements);
+        context.pauses.after(mesh.slots()).await;
         (steps, sum)
     }
 
@@ -276,12 +282,14 @@ impl FrameTracker {
 
 /// Predicts the displacement of each vertex to the next frame, indexed by vertex slot, from the slope of the extremal
 /// surface in space-time; it is smoothed over the mesh.
-fn prediction(mesh: &Mesh, region: &Region, samples: &SpaceTimeSamples) -> Vec<Vec3> {
+async fn prediction(mesh: &Mesh, context: &FrameContext<'_>, samples: &SpaceTimeSamples) -> Vec<Vec3> {
+    let region = context.region;
     let mut displacements = vec![Vec3::ZERO; mesh.slots()];
     for v in mesh.vertices() {
         let at = region.to_local(mesh.position(v));
         displacements[v.index()] =
             samples.prediction(at).map_or(Vec3::ZERO, |displacement| region.direction_to_space(displacement));
+        context.pauses.after(1).await;
     }
     (0..SMOOTHINGS).fold(displacements, |displacements, _| neighbour_means(mesh, &displacements))
 }

@@ -10,6 +10,10 @@
 use super::region::Region;
 use super::vote::{Faces, X, Y, Z};
 use crate::math::ConjugateGradients;
+use crate::methods::slices::Pauses;
+
+/// Number of voxels that count as one unit of work between pauses, in an iteration of the conjugate gradients.
+const VOXELS_PER_UNIT: usize = 64;
 
 /// Smallest weight of a face between two voxels, the share of windows that vote for it, with which the face counts as
 /// part of a wall between bright and dark.
@@ -30,7 +34,8 @@ pub(super) struct VoxelBox {
 }
 
 impl VoxelBox {
-    fn dims(&self) -> [usize; 3] {
+    /// Returns the numbers of voxels along x, y and z.
+    pub fn dims(&self) -> [usize; 3] {
         [0, 1, 2].map(|axis| self.ends[1][axis] - self.ends[0][axis] + 1)
     }
 
@@ -56,11 +61,12 @@ impl VoxelBox {
 
 /// Labels the voxels of a box in one frame: true on the bright side of the boundary. The labels are in the order of
 /// [`VoxelBox::index`]; `None` if no faces have enough votes to be part of a boundary.
-pub(super) fn label_bright(
+pub(super) async fn label_bright(
     region: &Region,
     frame: usize,
     faces: &Faces,
     voxels: VoxelBox,
+    pauses: &Pauses,
 ) -> Option<Vec<bool>> {
     let dims = voxels.dims();
     let steps = face_steps(region, frame, faces, voxels);
@@ -69,7 +75,7 @@ pub(super) fn label_bright(
         source[i] -= f64::from(step);
         source[j] += f64::from(step);
     }
-    let reconstructed = solve_poisson(dims, source);
+    let reconstructed = solve_poisson(dims, source, pauses).await;
     // Weighted means of the middles of the steps, at voxels adjacent to walls.
     let mut middles = vec![(0.0, 0.0); reconstructed.len()];
     for &(i, j, step) in steps.iter().filter(|(.., step)| step.abs() >= MIN_WEIGHT) {
@@ -131,7 +137,7 @@ fn face_steps(region: &Region, frame: usize, faces: &Faces, voxels: VoxelBox) ->
 
 /// Solves the Poisson equation of the labelling for the image whose graph Laplacian, see [`laplacian`], is `source`, by
 /// conjugate gradients.
-fn solve_poisson(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
+async fn solve_poisson(dims: [usize; 3], source: Vec<f64>, pauses: &Pauses) -> Vec<f64> {
     // Without a preconditioner.
     let same = |residual: &mut [f64]| residual.to_vec();
     let mut gradients = ConjugateGradients::new(vec![0.0; source.len()], source, same);
@@ -140,6 +146,7 @@ fn solve_poisson(dims: [usize; 3], source: Vec<f64>) -> Vec<f64> {
         if gradients.energy() <= enough || !gradients.iterate(|x| laplacian(dims, x), same) {
             break;
         }
+        pauses.after(dims.iter().product::<usize>() / VOXELS_PER_UNIT + 1).await;
     }
     gradients.into_solution()
 }
@@ -170,7 +177,7 @@ fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64]) -> Vec<f64> {
 
 /// Extends values that are known at some voxels of a box to all: each voxel takes the value of the known voxel fewest
 /// steps along the axes away. `None` if no value is known.
-fn extend_to_all(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>> {
+pub(super) fn extend_to_all(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>> {
     let mut all = known;
     let mut front: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_some()).collect();
     while !front.is_empty() {
@@ -203,6 +210,7 @@ mod tests {
     use super::super::working_space::WorkingSpace;
     use super::*;
     use crate::math::{DAffine3, DVec3, Random};
+    use crate::methods::slices::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -239,14 +247,16 @@ mod tests {
     }
 
     fn faces(region: &Region, threshold: f64) -> Faces {
-        BoundaryVoting::new(Window { half_width: 2, frames: 0, threshold, cyclic: false }, 1).faces(region, 0)
+        let window = Window { half_width: 2, frames: 0, threshold, cyclic: false };
+        finished(BoundaryVoting::new(window, 1).faces(region, 0, &Pauses::default()))
     }
 
     #[test]
     fn walls_decide_what_is_bright_even_under_shading() {
         let region = shaded();
         let whole = VoxelBox { ends: region.inner };
-        let found = label_bright(&region, 0, &faces(&region, 20.0), whole).unwrap();
+        let found =
+            finished(label_bright(&region, 0, &faces(&region, 20.0), whole, &Pauses::default())).unwrap();
         for (i, &is_bright) in found.iter().enumerate().filter(|&(i, _)| depth(i).abs() > 1.5) {
             assert_eq!(is_bright, depth(i) > 0.0, "{:?}", whole.at(i));
         }
@@ -260,7 +270,8 @@ mod tests {
     fn a_single_layer_of_voxels_is_labelled() {
         let region = shaded();
         let sheet = VoxelBox { ends: [[0, 0, 17], [DIMS[0] - 1, DIMS[1] - 1, 17]] };
-        let found = label_bright(&region, 0, &faces(&region, 20.0), sheet).unwrap();
+        let found =
+            finished(label_bright(&region, 0, &faces(&region, 20.0), sheet, &Pauses::default())).unwrap();
         let near_wall = |at: [usize; 3]| {
             let [nx, ny, _] = DIMS;
             depth((at[2] * ny + at[1]) * nx + at[0])
@@ -274,6 +285,7 @@ mod tests {
     #[test]
     fn without_walls_nothing_is_labelled() {
         let region = shaded();
-        assert!(label_bright(&region, 0, &faces(&region, 250.0), VoxelBox { ends: region.inner }).is_none());
+        let (none, whole) = (faces(&region, 250.0), VoxelBox { ends: region.inner });
+        assert!(finished(label_bright(&region, 0, &none, whole, &Pauses::default())).is_none());
     }
 }

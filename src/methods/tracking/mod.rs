@@ -18,13 +18,19 @@
 
 mod boundary_loss;
 mod box_sides;
+mod cavity;
+mod coarse;
 mod extremal;
 mod first;
 mod frame_tracker;
 mod labelling;
+mod lattice;
+mod motion;
+mod organ;
 mod params;
 mod presence;
 mod project;
+mod propose;
 mod region;
 mod samples;
 mod start;
@@ -37,18 +43,22 @@ pub use frame_tracker::FrameStatistics;
 pub use params::TrackingParams;
 
 use super::method::method;
+use super::slices::{Pauses, finished};
 use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::remesh::Changes;
 use crate::spatial::surface_distance;
 use crate::volume::Volume;
+use cavity::Filled;
 use frame_tracker::FrameTracker;
 use presence::Tracked;
 use project::SpaceTimeSamples;
 use region::Region;
 use samples::{Falloff, SampleField};
+use std::sync::Arc;
 use vote::{BoundaryVoting, Faces, Window};
+use warnings::SurfaceFacts;
 
 /// Selects which connected surface of the first frame is tracked, if there are several.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -70,6 +80,48 @@ pub enum Bounds {
     Voxels([[usize; 3]; 2]),
 }
 
+/// What [`SurfaceTracker::propose`] is told about an object.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Query {
+    /// A point in the object, in world coordinates, in a frame.
+    Point {
+        /// The point.
+        at: DVec3,
+        /// The index of the frame.
+        frame: usize,
+    },
+    /// Two corners of a box with the object, those with the least and the largest world coordinates: what moves most in it.
+    Box([DVec3; 2]),
+    /// Nothing: what moves most in the whole sequence.
+    #[default]
+    Moving,
+}
+
+/// Proposed options of a [`SurfaceTracker`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Proposal {
+    /// The first and the last voxel of the box, both inclusive, for [`Bounds::Voxels`].
+    pub bounds: [[usize; 3]; 2],
+    /// A point in the middle of the object in the first frame that has it, in world coordinates, for
+    /// [`Component::Nearest`].
+    pub component: DVec3,
+    /// The first frame that has the object.
+    pub frame: usize,
+    /// The edge threshold, in units of intensity.
+    pub threshold: f64,
+}
+
+/// What counts as inside of a cavity.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Cavity {
+    /// Dark structures within it, such as muscles in a chamber of the heart, and the furrows between those along its wall:
+    /// its volume is what clinical measurements give. Convex objects without any are as they are.
+    #[default]
+    Closed,
+    /// What is bright only, as in the paper.
+    Open,
+}
+
 /// Options to create a [`SurfaceTracker`].
 #[derive(Clone, Debug)]
 pub struct TrackingOptions {
@@ -83,6 +135,8 @@ pub struct TrackingOptions {
     /// The surface in the first frame, from which tracking starts, in world coordinates; by default it is extracted
     /// from the image.
     pub start: Option<TriangleMesh>,
+    /// What counts as inside of the tracked surface.
+    pub cavity: Cavity,
     /// The initial parameters; `threshold`, `radius` and `time_scale` are derived from the volume if they are 0.
     pub params: TrackingParams,
 }
@@ -102,6 +156,11 @@ pub struct SurfaceTracker {
     component: Component,
     /// The caller's mesh for the first frame; empty without one.
     start: Mesh,
+    cavity: Cavity,
+    /// By frame, the voxels of the region that are filled, since the cavity is closed; none before the boundary is found.
+    filled: Vec<Vec<Filled>>,
+    /// Identifies the input in saved states.
+    fingerprint: u64,
     params: TrackingParams,
     image: ImageStatistics,
     voting: BoundaryVoting,
@@ -110,13 +169,17 @@ pub struct SurfaceTracker {
     faces: Vec<Faces>,
     frame_tracker: Option<FrameTracker>,
     /// The boundary points around the newest tracked frame in time, `None` before the first.
-    samples: Option<SpaceTimeSamples>,
+    samples: Option<Arc<SpaceTimeSamples>>,
     mesh: Mesh,
     /// The surface of each frame tracked so far.
     meshes: Vec<TriangleMesh>,
     statistics: Vec<FrameStatistics>,
+    /// The votes of windows over several frames, of the frame whose votes are those of windows within it for an attempt.
+    replaced_faces: Option<(usize, Faces)>,
     /// By frame, the mean intensities inside and outside of its surface, in steps of the quantised intensities.
     intensities_at_surface: Vec<Option<[f64; 2]>>,
+    /// What warnings tell of the surface in each frame tracked so far.
+    facts: Vec<SurfaceFacts>,
     /// `None` until it is known, NaN where it is not defined.
     cycle_closure_error: Option<f64>,
     /// The frames in which the surface of the frame before ended and another one began.
@@ -168,7 +231,7 @@ impl SurfaceTracker {
     /// below a tenth of a voxel; [`MethodError::Mesh`] for a start that is not a closed surface, or intersects itself;
     /// [`MethodError::Volume`] if a frame does not fit into memory.
     pub fn new(options: TrackingOptions) -> Result<Self, MethodError> {
-        let TrackingOptions { volume, bounds, component, start, params } = options;
+        let TrackingOptions { volume, bounds, component, start, cavity, params } = options;
         params.validate()?;
         if volume.frames() < 2 {
             let problem = "must have at least two frames, got one";
@@ -192,6 +255,9 @@ impl SurfaceTracker {
             region,
             component,
             start,
+            cavity,
+            filled: Vec::new(),
+            fingerprint: 0,
             params: TrackingParams::default(),
             image,
             faces: Vec::new(),
@@ -199,13 +265,16 @@ impl SurfaceTracker {
             samples: None,
             meshes: Vec::new(),
             statistics: Vec::new(),
+            replaced_faces: None,
             intensities_at_surface: Vec::new(),
+            facts: Vec::new(),
             cycle_closure_error: None,
             lost: Vec::new(),
             steps: 0,
             clock: || 0.0,
         };
         tracker.params = tracker.with_defaults(params)?;
+        tracker.fingerprint = tracker.input_hash();
         tracker.restart();
         Ok(tracker)
     }
@@ -242,6 +311,8 @@ impl SurfaceTracker {
 
     /// Resets the run to before its first step, with the current parameters; only the number of steps is kept.
     fn restart(&mut self) {
+        self.region.unfill(&self.filled);
+        self.filled.clear();
         self.region.threshold = self.params.threshold / self.region.quantum;
         let window = Window {
             half_width: self.params.window as usize,
@@ -251,10 +322,12 @@ impl SurfaceTracker {
         };
         self.voting = BoundaryVoting::new(window, self.frames());
         self.faces.clear();
+        self.replaced_faces = None;
         (self.frame_tracker, self.samples, self.cycle_closure_error) = (None, None, None);
         self.meshes.clear();
         self.statistics.clear();
         self.intensities_at_surface.clear();
+        self.facts.clear();
         self.lost.clear();
         let replaced = std::mem::replace(&mut self.mesh, self.start.clone());
         self.mesh.advance_versions_past(&replaced);
@@ -369,6 +442,16 @@ impl SurfaceTracker {
     /// [`MethodError::InvalidArgument`] if there is no boundary or no closed surface; [`MethodError::Mesh`] and
     /// [`MethodError::Volume`] if memory does not suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
+        finished(self.step_in_slices())
+    }
+
+    /// Runs one step as [`Self::step`] does, with pauses. If the future is dropped at one, [`Self::discard_step`] must be
+    /// called, and the run is as it was before the step.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub async fn step_in_slices(&mut self) -> Result<StepReport, MethodError> {
+        let pauses = Pauses::default();
         let began = (self.clock)();
         let mut times = Times::default();
         let mut changes = Changes::default();
@@ -377,18 +460,33 @@ impl SurfaceTracker {
         }
         if self.faces.len() < self.frames() {
             let frame = self.faces.len();
-            let faces = self.voting.faces(&self.region, frame);
+            if self.cavity == Cavity::Closed && self.filled.is_empty() {
+                self.close_cavity(&pauses).await;
+            }
+            let faces = self.voting.faces(&self.region, frame, &pauses).await;
             self.faces.push(faces);
             times.add("boundary", (self.clock)() - began);
         } else if self.meshes.len() < self.frames() {
-            changes = self.next_frame()?;
+            changes = self.next_frame(&pauses).await?;
             times.add("surface", (self.clock)() - began);
         } else {
-            self.close_cycle();
+            self.close_cycle(&pauses).await;
             times.add("closure", (self.clock)() - began);
         }
         self.steps = self.steps.saturating_add(1);
         Ok(self.report(changes, times))
+    }
+
+    /// Fills dark voxels within the cavity, so that they count as blood.
+    async fn close_cavity(&mut self, pauses: &Pauses) {
+        let mut voting = BoundaryVoting::new(self.voting.window(), self.frames());
+        self.filled = self.voxels_to_fill(&mut voting, pauses).await;
+        self.region.fill(&self.filled);
+    }
+
+    /// Undoes what a step has changed that was dropped at a pause; see [`Self::step_in_slices`].
+    pub fn discard_step(&mut self) {
+        self.end_own_windows(false);
     }
 
     /// Returns the number of frames of the volume.
@@ -398,23 +496,23 @@ impl SurfaceTracker {
 
     /// Tracks the surface into the next frame, or extracts it where an object begins; returns the edits of the mesh. The
     /// surface is empty in frames without an object. If this fails, nothing has changed.
-    fn next_frame(&mut self) -> Result<Changes, MethodError> {
+    async fn next_frame(&mut self, pauses: &Pauses) -> Result<Changes, MethodError> {
         let (frame, space) = (self.meshes.len(), self.region.space);
         if frame == 0 {
-            self.check_boundary()?;
+            self.check_boundary(pauses).await?;
         }
         let mut last = self.mesh.clone();
         space.enter(&mut last);
         let has_surface = last.vertex_count() > 0;
         if has_surface {
-            let tracker = self.frame_tracker.take();
+            let tracker = self.frame_tracker.clone();
             let tracker =
                 tracker.unwrap_or_else(|| FrameTracker::new(measure(&last.to_triangles()).edge_mean));
-            let (edge, from) = (tracker.edge, self.samples.take());
-            let found = self.follow(&last, tracker, from.as_ref(), frame);
-            (self.frame_tracker, self.samples) = (Some(FrameTracker::new(edge)), from);
+            let (edge, from) = (tracker.edge, self.samples.clone());
+            let found = self.follow(&last, tracker, from.as_deref(), frame, pauses).await;
+            self.frame_tracker = Some(FrameTracker::new(edge));
             if let Some(found) = found {
-                return match self.extracted_instead(&found, frame)? {
+                return match self.extracted_instead(&found, frame, pauses).await? {
                     Some(instead) => Ok(self.set_begun_frame(instead)),
                     None => Ok(self.set_frame(found)),
                 };
@@ -422,7 +520,7 @@ impl SurfaceTracker {
         }
         // Nothing else begins where a caller's start ends.
         let may_begin = frame > 0 || !has_surface;
-        match if may_begin { self.begin(&last, frame)? } else { None } {
+        match if may_begin { self.begin(&last, frame, pauses).await? } else { None } {
             Some(found) => Ok(self.set_begun_frame(found)),
             None => {
                 self.set_empty_frame();
@@ -452,6 +550,7 @@ impl SurfaceTracker {
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
         self.statistics.push(space.statistics(found.statistics));
         self.intensities_at_surface.push(self.measured_intensities(self.meshes.len() - 1));
+        self.facts.push(self.measured_facts(self.meshes.len() - 1));
         found.changes
     }
 
@@ -463,33 +562,37 @@ impl SurfaceTracker {
         self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
         self.statistics.push(FrameStatistics::default());
         self.intensities_at_surface.push(None);
+        self.facts.push(SurfaceFacts::default());
     }
 
     /// Tracks a copy of the last frame's surface on to the first frame, and sets the cycle closure error to its mean
     /// distance from the surface there; to NaN if one of the two is empty, or the first frame has no object there.
-    fn close_cycle(&mut self) {
-        self.cycle_closure_error = Some(f64::NAN);
-        let (Some(tracker), Some(first)) = (self.frame_tracker.clone(), self.meshes.first()) else {
-            return;
-        };
+    async fn close_cycle(&mut self, pauses: &Pauses) {
+        self.cycle_closure_error = Some(self.measured_closure(pauses).await.unwrap_or(f64::NAN));
+    }
+
+    /// Returns the cycle closure error; `None` where it is not defined.
+    async fn measured_closure(&mut self, pauses: &Pauses) -> Option<f64> {
+        let (tracker, first) = (self.frame_tracker.clone()?, self.meshes.first()?);
         if first.triangles.is_empty() || self.mesh.vertex_count() == 0 {
-            return;
+            return None;
         }
         let space = self.region.space;
         let mut mesh = self.mesh.clone();
         space.enter(&mut mesh);
-        self.voting.ensure_levels(&self.region, 0);
-        let mut closed = self.tracked(mesh, tracker, self.samples.as_ref(), 0, &self.voting);
-        if closed.is_present {
-            space.leave(&mut closed.mesh);
-            let distance = surface_distance(&closed.mesh.to_triangles(), first);
-            self.cycle_closure_error = Some(distance.map_or(f64::NAN, |distance| distance.mean));
+        self.voting.ensure_levels(&self.region, 0, pauses).await;
+        let samples = self.samples.as_deref();
+        let mut closed = self.tracked(mesh, tracker, samples, 0, &self.voting, pauses).await;
+        if !closed.is_present {
+            return None;
         }
+        space.leave(&mut closed.mesh);
+        surface_distance(&closed.mesh.to_triangles(), first).ok().map(|distance| distance.mean)
     }
 
     /// Collects the boundary points around the newest tracked frame in time; `None` before the first frame is tracked.
-    fn newest_samples(&self) -> Option<SpaceTimeSamples> {
-        self.meshes.len().checked_sub(1).map(|frame| self.samples_around(frame))
+    fn newest_samples(&self) -> Option<Arc<SpaceTimeSamples>> {
+        self.meshes.len().checked_sub(1).map(|frame| Arc::new(self.samples_around(frame)))
     }
 
     /// Collects the boundary points of a frame and of those around it in time, for plane fits in that frame.

@@ -18,9 +18,11 @@ use super::{FrameStatistics, SurfaceTracker};
 use crate::math::DAffine3;
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
+use crate::methods::slices::Pauses;
 use crate::remesh::Changes;
 use crate::volume::voxels_inside;
 use fixedbitset::FixedBitSet;
+use std::sync::Arc;
 
 /// Smallest share of a surface's vertices on a boundary of the frame for an object to be there. Below it, noise and a
 /// neighbouring object could hold a surface; above it, one with gaps in its boundary would end. The surface of a whole
@@ -44,7 +46,7 @@ const MORE_REJECTED: f64 = 0.1;
 pub(super) struct Tracked {
     pub mesh: Mesh,
     pub tracker: FrameTracker,
-    pub samples: SpaceTimeSamples,
+    pub samples: Arc<SpaceTimeSamples>,
     pub changes: Changes,
     pub statistics: FrameStatistics,
     /// Whether the frame has an object at the surface.
@@ -54,47 +56,49 @@ pub(super) struct Tracked {
 impl SurfaceTracker {
     /// Tracks a surface, given in the working space, into a frame; `from` are the boundary points around the frame before,
     /// `None` if the surface begins here. `voting` has the levels of the frame.
-    pub(super) fn tracked(
+    pub(super) async fn tracked(
         &self,
         mut mesh: Mesh,
         mut tracker: FrameTracker,
         from: Option<&SpaceTimeSamples>,
         frame: usize,
         voting: &BoundaryVoting,
+        pauses: &Pauses,
     ) -> Tracked {
         let samples = self.samples_around(frame);
         let params = &self.region.space.params(&self.params);
-        let context = FrameContext { region: &self.region, params, frame, samples: &samples, voting };
-        let (changes, statistics) = tracker.track_frame(&mut mesh, from, &context);
+        let context = FrameContext { region: &self.region, params, frame, samples: &samples, voting, pauses };
+        let (changes, statistics) = tracker.track_frame(&mut mesh, from, &context).await;
         let voxel = self.region.spacing.element_product();
         let is_present = statistics.volume >= voxel && context.is_present(&mesh, &statistics);
+        let samples = Arc::new(samples);
         Tracked { mesh, tracker, samples, changes, statistics, is_present }
     }
 
     /// Tracks the surface of the frame before, `mesh` in the working space, into a frame; `None` if the frame has no
     /// object there. If windows over several frames find none, the votes of the frame are replaced by those of windows
     /// within the frame, provided that these find one.
-    pub(super) fn follow(
+    pub(super) async fn follow(
         &mut self,
         mesh: &Mesh,
         tracker: FrameTracker,
         from: Option<&SpaceTimeSamples>,
         frame: usize,
+        pauses: &Pauses,
     ) -> Option<Tracked> {
         if self.region.is_blank(frame) {
             return None;
         }
         let edge = tracker.edge;
-        self.voting.ensure_levels(&self.region, frame);
-        let first = self.tracked(mesh.clone(), tracker, from, frame, &self.voting);
+        self.voting.ensure_levels(&self.region, frame, pauses).await;
+        let first = self.tracked(mesh.clone(), tracker, from, frame, &self.voting, pauses).await;
         if first.is_present {
             return Some(first);
         }
-        self.with_own_windows(frame, |this, voting| {
-            let again = this.tracked(mesh.clone(), FrameTracker::new(edge), from, frame, voting);
-            Ok(again.is_present.then_some(again))
-        })
-        .unwrap_or(None)
+        let voting = self.use_own_windows(frame, pauses).await?;
+        let again = self.tracked(mesh.clone(), FrameTracker::new(edge), from, frame, &voting, pauses).await;
+        self.end_own_windows(again.is_present);
+        again.is_present.then_some(again)
     }
 
     /// Returns the surface extracted from a frame where one was tracked into it, if many of the projections of that one fail,
@@ -102,10 +106,11 @@ impl SurfaceTracker {
     ///
     /// # Errors
     /// [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
-    pub(super) fn extracted_instead(
+    pub(super) async fn extracted_instead(
         &self,
         tracked: &Tracked,
         frame: usize,
+        pauses: &Pauses,
     ) -> Result<Option<Tracked>, MethodError> {
         let Some(began) = self.frame_of_begin(frame) else { return Ok(None) };
         let passes = FIRST_FRAME_PASSES as f64;
@@ -116,12 +121,12 @@ impl SurfaceTracker {
         }
         let inside = inside_voxels(&self.region, &tracked.mesh.to_triangles());
         let shared = |part: &TriangleMesh| inside_voxels(&self.region, part).intersection(&inside).count();
-        let parts = self.surfaces_in(frame)?.into_iter().map(|part| (shared(&part), part));
+        let parts = self.surfaces_in(frame, pauses).await?.into_iter().map(|part| (shared(&part), part));
         let Some((_, part)) = parts.filter(|(shared, _)| *shared > 0).max_by_key(|(shared, _)| *shared)
         else {
             return Ok(None);
         };
-        let found = self.begun_at(&part, frame, &self.voting)?;
+        let found = self.begun_at(&part, frame, &self.voting, pauses).await?;
         let is_better = found.is_present && rejected_share(&found.statistics, passes) < 0.5 * now;
         Ok(is_better.then_some(found))
     }
@@ -139,85 +144,96 @@ impl SurfaceTracker {
     ///
     /// # Errors
     /// [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
-    pub(super) fn begin(&mut self, last: &Mesh, frame: usize) -> Result<Option<Tracked>, MethodError> {
+    pub(super) async fn begin(
+        &mut self,
+        last: &Mesh,
+        frame: usize,
+        pauses: &Pauses,
+    ) -> Result<Option<Tracked>, MethodError> {
         if self.region.is_blank(frame) {
             return Ok(None);
         }
-        self.voting.ensure_levels(&self.region, frame);
-        if let Some(found) = self.begin_with(last, frame, &self.voting)? {
+        self.voting.ensure_levels(&self.region, frame, pauses).await;
+        if let Some(found) = self.begin_with(last, frame, &self.voting, pauses).await? {
             return Ok(Some(found));
         }
-        self.with_own_windows(frame, |this, voting| this.begin_with(last, frame, voting))
+        let Some(voting) = self.use_own_windows(frame, pauses).await else { return Ok(None) };
+        let found = self.begin_with(last, frame, &voting, pauses).await;
+        self.end_own_windows(matches!(found, Ok(Some(_))));
+        found
     }
 
-    fn begin_with(
+    async fn begin_with(
         &self,
         last: &Mesh,
         frame: usize,
         voting: &BoundaryVoting,
+        pauses: &Pauses,
     ) -> Result<Option<Tracked>, MethodError> {
-        let parts = self.surfaces_in(frame)?;
+        let parts = self.surfaces_in(frame, pauses).await?;
         if parts.is_empty() {
             return Ok(None);
         }
-        let known = self.known_before(last, frame);
+        let known = self.known_before(last, frame, pauses).await;
         let Some(part) =
             self.tracked_component(parts.into_iter().filter(|part| !self.is_known(part, &known)))
         else {
             return Ok(None);
         };
-        let found = self.begun_at(&part, frame, voting)?;
+        let found = self.begun_at(&part, frame, voting, pauses).await?;
         // In the first frame there is nothing to compare with, and what was extracted is given.
         Ok((found.is_present || frame == 0).then_some(found))
     }
 
     /// Tracks an extracted surface into its frame.
-    fn begun_at(
+    async fn begun_at(
         &self,
         part: &TriangleMesh,
         frame: usize,
         voting: &BoundaryVoting,
+        pauses: &Pauses,
     ) -> Result<Tracked, MethodError> {
         let mesh = self.remeshed(part)?;
+        pauses.after(mesh.triangle_count()).await;
         let edge = match &self.frame_tracker {
             Some(tracker) => tracker.edge,
             None => measure(&mesh.to_triangles()).edge_mean,
         };
-        Ok(self.tracked(mesh, FrameTracker::new(edge), None, frame, voting))
+        Ok(self.tracked(mesh, FrameTracker::new(edge), None, frame, voting, pauses).await)
     }
 
-    /// Calls `attempt` with the votes of a frame replaced by those of windows within it, and keeps these if it finds
-    /// something; `None` if windows are of single frames anyway.
-    fn with_own_windows(
-        &mut self,
-        frame: usize,
-        attempt: impl FnOnce(&Self, &BoundaryVoting) -> Result<Option<Tracked>, MethodError>,
-    ) -> Result<Option<Tracked>, MethodError> {
+    /// Replaces the votes of a frame by those of windows within it, until [`Self::end_own_windows`] is called, and returns
+    /// their levels; `None` if windows are of single frames anyway.
+    async fn use_own_windows(&mut self, frame: usize, pauses: &Pauses) -> Option<BoundaryVoting> {
         if self.params.window_frames == 0 {
-            return Ok(None);
+            return None;
         }
         let window = Window { frames: 0, ..self.voting.window() };
         let mut voting = BoundaryVoting::new(window, self.frames());
-        let mut faces = voting.faces(&self.region, frame);
-        let several = self.faces[frame].clone();
+        let mut faces = voting.faces(&self.region, frame, pauses).await;
         // Faces along time have no windows within one frame.
-        faces[super::vote::TIME].clone_from(&several[super::vote::TIME]);
-        self.faces[frame] = faces;
-        let found = attempt(self, &voting);
-        if !matches!(found, Ok(Some(_))) {
+        faces[super::vote::TIME].clone_from(&self.faces[frame][super::vote::TIME]);
+        let several = std::mem::replace(&mut self.faces[frame], faces);
+        self.replaced_faces = Some((frame, several));
+        Some(voting)
+    }
+
+    /// Keeps the votes of windows within a frame, or takes those that they replaced again.
+    pub(super) fn end_own_windows(&mut self, keeps: bool) {
+        if let (Some((frame, several)), false) = (self.replaced_faces.take(), keeps) {
             self.faces[frame] = several;
         }
-        found
     }
 
     /// Returns the voxels of the region that were bright in the frame before, outside of the tracked surface `last`;
     /// empty for the first frame.
-    fn known_before(&self, last: &Mesh, frame: usize) -> FixedBitSet {
+    async fn known_before(&self, last: &Mesh, frame: usize, pauses: &Pauses) -> FixedBitSet {
         let region = &self.region;
         let mut known = FixedBitSet::with_capacity(region.dims.iter().product());
         let Some(before) = frame.checked_sub(1) else { return known };
         let voxels = VoxelBox { ends: region.inner };
-        let Some(bright) = label_bright(region, before, &self.faces[before], voxels) else { return known };
+        let bright = label_bright(region, before, &self.faces[before], voxels, pauses).await;
+        let Some(bright) = bright else { return known };
         for (i, _) in bright.iter().enumerate().filter(|(_, is_bright)| **is_bright) {
             known.insert(region.index(voxels.at(i)));
         }
@@ -246,7 +262,7 @@ fn rejected_share(statistics: &FrameStatistics, passes: f64) -> f64 {
 }
 
 /// Returns the voxels of the region whose centres are inside a surface, given in the working space.
-fn inside_voxels(region: &Region, surface: &TriangleMesh) -> FixedBitSet {
+pub(super) fn inside_voxels(region: &Region, surface: &TriangleMesh) -> FixedBitSet {
     let to_voxels = DAffine3::from_scale(region.spacing.recip()) * region.from_space;
     voxels_inside(
         &TriangleMesh { origin: Default::default(), ..surface.clone() }.transformed(&to_voxels),

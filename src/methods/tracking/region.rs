@@ -8,14 +8,14 @@ use crate::methods::MethodError;
 use crate::volume::{Volume, Voxels, trilinear};
 
 /// Highest quantised intensity: intensities are quantised to 0 to 254, one byte per voxel.
-const MAX_LEVEL: f64 = 254.0;
+pub(super) const MAX_LEVEL: f64 = 254.0;
 
 /// Share of the region's voxels, one in a thousand, that may be below the quantised range of intensities, and above it;
 /// their intensities are clamped to this range.
 const OUTLIERS: f64 = 1e-3;
 
 /// Number of bins of the histogram from which the range of intensities that is quantised is determined.
-const BINS: usize = 4096;
+pub(super) const BINS: usize = 4096;
 
 /// Share of the range of intensities up to which those next to voxels without a value are among the darkest: noise in a
 /// background reaches a tenth, and the values of an object without one are above it on average.
@@ -292,29 +292,33 @@ impl Region {
         trilinear(self.dims, position / self.spacing, |i| f64::from(self.frames[frame][i]))
     }
 
-    /// Estimates the standard deviation of the noise, in quantisation steps, from differences between neighbours along
-    /// x: most of them are noise.
+    /// Estimates the standard deviation of the noise, see [`noise_of`], in all frames but blank ones.
     pub fn noise(&self) -> f64 {
-        let mut counts = [0u64; 256];
-        for (frame, _) in self.frames.iter().zip(&self.is_blank).filter(|(_, is_blank)| !**is_blank) {
-            for row in frame.chunks_exact(self.dims[0]) {
-                let pairs = row.windows(2).filter(|pair| !self.has_background || pair[0] > 0 && pair[1] > 0);
-                pairs.for_each(|pair| counts[usize::from(pair[0].abs_diff(pair[1]))] += 1);
-            }
-        }
-        let all: u64 = counts.iter().sum();
-        let (mut below, mut median) = (0, 0.0);
-        for (size, &count) in counts.iter().enumerate() {
-            if 2 * (below + count) >= all && count > 0 {
-                // Interpolates linearly within the bin.
-                median = size as f64 - 0.5 + (all as f64 / 2.0 - below as f64) / count as f64;
-                break;
-            }
-            below += count;
-        }
-        // For two normally distributed values, the median of |a − b| is 0.6745·√2 standard deviations.
-        median.max(0.0) / (0.674_49 * std::f64::consts::SQRT_2)
+        let frames = self.frames.iter().zip(&self.is_blank).filter(|(_, is_blank)| !**is_blank);
+        noise_of(frames.flat_map(|(frame, _)| frame.chunks_exact(self.dims[0])), self.has_background)
     }
+}
+
+/// Estimates the standard deviation of the noise, in quantisation steps, from differences between neighbours along the rows
+/// of an image: most of them are noise. With `has_background`, pairs with a 0 are left out.
+pub(super) fn noise_of<'a>(rows: impl Iterator<Item = &'a [u8]>, has_background: bool) -> f64 {
+    let mut counts = [0u64; 256];
+    for row in rows {
+        let pairs = row.windows(2).filter(|pair| !has_background || pair[0] > 0 && pair[1] > 0);
+        pairs.for_each(|pair| counts[usize::from(pair[0].abs_diff(pair[1]))] += 1);
+    }
+    let all: u64 = counts.iter().sum();
+    let (mut below, mut median) = (0, 0.0);
+    for (size, &count) in counts.iter().enumerate() {
+        if 2 * (below + count) >= all && count > 0 {
+            // Interpolates linearly within the bin.
+            median = size as f64 - 0.5 + (all as f64 / 2.0 - below as f64) / count as f64;
+            break;
+        }
+        below += count;
+    }
+    // For two normally distributed values, the median of |a − b| is 0.6745·√2 standard deviations.
+    median.max(0.0) / (0.674_49 * std::f64::consts::SQRT_2)
 }
 
 fn is_float(volume: &Volume) -> bool {
@@ -343,13 +347,14 @@ fn check_size(dims: [usize; 3], frames: usize) -> Result<(), MethodError> {
     Err(MethodError::invalid("box", problem))
 }
 
-fn bin_of(value: f32) -> usize {
+/// Returns the bin of an intensity, normalised to 0..1.
+pub(super) fn bin_of(value: f32) -> usize {
     (value * (BINS - 1) as f32 + 0.5) as usize
 }
 
 /// Returns the lower and upper quantile of the intensities, normalised to 0..1, beyond which voxels are outliers, from
 /// `counts`, the number of voxels in each of the [`BINS`].
-fn intensity_quantiles(counts: &[u64]) -> [f64; 2] {
+pub(super) fn intensity_quantiles(counts: &[u64]) -> [f64; 2] {
     let few = OUTLIERS * counts.iter().sum::<u64>() as f64;
     let beyond = |from_top: bool| {
         let mut sum = 0;
@@ -402,7 +407,10 @@ fn check_extent(parameter: &'static str, counts: [usize; 3], spacing: [f64; 3]) 
 
 /// Returns the first and the last voxel whose centres are inside the bounding box, along the voxel axes, of a box in
 /// the world, clamped to the volume; at least one voxel along each axis.
-fn voxels_around(volume: &Volume, [low, high]: [DVec3; 2]) -> Result<[[usize; 3]; 2], MethodError> {
+pub(super) fn voxels_around(
+    volume: &Volume,
+    [low, high]: [DVec3; 2],
+) -> Result<[[usize; 3]; 2], MethodError> {
     let last = volume.dims().map(|n| n - 1);
     if !low.is_finite() || !high.is_finite() || low.cmpge(high).any() {
         let problem = format!("must be finite with min < max along every axis, got min {low} and max {high}");

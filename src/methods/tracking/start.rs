@@ -8,6 +8,7 @@ use crate::math::{Vec3, triangle};
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
 use crate::methods::caller_mesh::checked_mesh;
+use crate::methods::slices::Pauses;
 use crate::remesh::{EdgeBounds, remesh};
 
 /// Target edge length of the mesh extracted from the first frame, in units of the shortest side of a voxel.
@@ -51,9 +52,9 @@ impl SurfaceTracker {
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if it has none.
-    pub(super) fn check_boundary(&mut self) -> Result<(), MethodError> {
+    pub(super) async fn check_boundary(&self, pauses: &Pauses) -> Result<(), MethodError> {
         if self.faces.iter().flatten().all(Vec::is_empty) {
-            let largest = self.voting.largest_step(&self.region) * self.region.quantum;
+            let largest = self.voting.largest_step(&self.region, pauses).await * self.region.quantum;
             let largest = if largest < 0.01 { format!("{largest:.2e}") } else { format!("{largest:.4}") };
             let problem = format!(
                 "must be below {largest}, the largest step in the box, got {}: no boundary was found",
@@ -65,7 +66,7 @@ impl SurfaceTracker {
             return Ok(());
         }
         for frame in 0..self.frames() {
-            if !self.surfaces_in(frame)?.is_empty() {
+            if !self.surfaces_in(frame, pauses).await?.is_empty() {
                 return Ok(());
             }
         }
@@ -78,8 +79,13 @@ impl SurfaceTracker {
     ///
     /// # Errors
     /// [`MethodError::Volume`] if memory does not suffice.
-    pub(super) fn surfaces_in(&self, frame: usize) -> Result<Vec<TriangleMesh>, MethodError> {
-        let surface = extract_bright_surface(&self.region, frame, &self.faces[frame], self.falloff())?;
+    pub(super) async fn surfaces_in(
+        &self,
+        frame: usize,
+        pauses: &Pauses,
+    ) -> Result<Vec<TriangleMesh>, MethodError> {
+        let faces = &self.faces[frame];
+        let surface = extract_bright_surface(&self.region, frame, faces, self.falloff(), pauses).await?;
         let mut parts = surface.components();
         parts.retain(|part| measure(part).volume > 0.0);
         Ok(parts)

@@ -1,10 +1,11 @@
 //! Saves a tracking run and restores it bit for bit. The saved state holds the boundary votes and the surfaces; the
 //! image comes from the same volume, and the weights of boundary points around the newest frame are computed again.
 
+use super::cavity::{Filled, MAX_FILLED};
 use super::frame_tracker::{FrameStatistics, FrameTracker};
 use super::vote::{Faces, TIME};
 use super::working_space::WorkingSpace;
-use super::{Component, SurfaceTracker, TrackingParams};
+use super::{Cavity, Component, SurfaceTracker, TrackingParams};
 use crate::math::Vec3;
 use crate::mesh::{Mesh, TriangleMesh};
 use crate::methods::MethodError;
@@ -16,6 +17,9 @@ const MAGIC: Magic = *b"VSCLTRK\x01";
 /// That of states which also list the frames in which one surface ended and another began. States without such frames
 /// keep the first layout.
 const MAGIC_WITH_LOST: Magic = *b"VSCLTRK\x02";
+
+/// That of states of closed cavities, which also list the frames as above, and the voxels filled in each frame.
+const MAGIC_CLOSED: Magic = *b"VSCLTRK\x03";
 
 /// The saved state of a [`SurfaceTracker`]: everything of a run but its input and what is computed again.
 #[derive(Serialize, Deserialize)]
@@ -39,7 +43,7 @@ impl SurfaceTracker {
     pub fn save(&self) -> Vec<u8> {
         let plain = |mesh: &TriangleMesh| (mesh.positions.clone(), mesh.triangles.clone());
         let state = State {
-            fingerprint: self.fingerprint(),
+            fingerprint: self.fingerprint,
             params: self.params.clone(),
             faces: self.faces.clone(),
             mesh: self.mesh.clone(),
@@ -49,7 +53,9 @@ impl SurfaceTracker {
             cycle_closure_error: self.cycle_closure_error,
             steps: self.steps,
         };
-        if self.lost.is_empty() {
+        if self.cavity == Cavity::Closed {
+            encode(&MAGIC_CLOSED, &(state, &self.lost, &self.filled))
+        } else if self.lost.is_empty() {
             encode(&MAGIC, &state)
         } else {
             encode(&MAGIC_WITH_LOST, &(state, &self.lost))
@@ -61,20 +67,26 @@ impl SurfaceTracker {
     /// # Errors
     /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let (mut state, lost): (State, Vec<u32>) = if bytes.starts_with(&MAGIC_WITH_LOST) {
-            decode(&MAGIC_WITH_LOST, bytes)?
-        } else {
-            (decode(&MAGIC, bytes)?, Vec::new())
+        let (mut state, lost, filled): (State, Vec<u32>, Vec<Vec<Filled>>) = match self.cavity {
+            Cavity::Closed => decode(&MAGIC_CLOSED, bytes)?,
+            Cavity::Open if bytes.starts_with(&MAGIC_WITH_LOST) => {
+                let (state, lost) = decode(&MAGIC_WITH_LOST, bytes)?;
+                (state, lost, Vec::new())
+            }
+            Cavity::Open => (decode(&MAGIC, bytes)?, Vec::new(), Vec::new()),
         };
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
-        if state.fingerprint != self.fingerprint() {
-            return bad("volume", "the state belongs to another volume, box, component or start");
+        if state.fingerprint != self.fingerprint {
+            return bad("volume", "the state belongs to another volume, box, component, cavity or start");
         }
         let Ok(params) = self.with_defaults(state.params) else {
             return bad("parameters", "out of range");
         };
         if state.faces.len() > self.frames() || !state.faces.iter().all(|faces| self.are_valid(faces)) {
             return bad("boundary", "boundary votes outside the box");
+        }
+        if !self.are_valid_fillings(&filled, !state.faces.is_empty()) {
+            return bad("cavity", "inconsistent with this tracker");
         }
         let origin = self.region.space.origin;
         state.mesh.set_origin(origin);
@@ -112,12 +124,15 @@ impl SurfaceTracker {
         }
         self.params = params;
         self.restart();
+        self.filled = filled;
+        self.region.fill(&self.filled);
         let replaced = std::mem::replace(&mut self.mesh, state.mesh);
         self.mesh.advance_versions_past(&replaced);
         self.faces = state.faces;
         (self.meshes, self.statistics) = (meshes, state.statistics);
         self.intensities_at_surface =
             (0..self.meshes.len()).map(|frame| self.measured_intensities(frame)).collect();
+        self.facts = (0..self.meshes.len()).map(|frame| self.measured_facts(frame)).collect();
         (self.cycle_closure_error, self.steps, self.lost) = (state.cycle_closure_error, state.steps, lost);
         self.frame_tracker = state.edge.map(|edge| FrameTracker::new(edge * self.region.space.scale));
         self.samples = self.newest_samples();
@@ -135,9 +150,30 @@ impl SurfaceTracker {
             .all(|(direction, list)| list.iter().all(|face| is_sound(direction, face.voxel, face.weight)))
     }
 
+    /// Returns whether filled voxels are in the region, and were as dark as the image is; `is_begun` tells whether the boundary
+    /// of a frame has been found.
+    fn are_valid_fillings(&self, filled: &[Vec<Filled>], is_begun: bool) -> bool {
+        let original = |frame: usize, voxel: u32| {
+            let now = self.filled.get(frame).and_then(|list| {
+                let at = list.binary_search_by_key(&voxel, |one| one.voxel).ok()?;
+                list.get(at)
+            });
+            now.map_or_else(|| self.region.frames[frame].get(voxel as usize).copied(), |one| Some(one.before))
+        };
+        let is_sound = |(frame, list): (usize, &Vec<Filled>)| {
+            list.is_sorted_by(|a, b| a.voxel < b.voxel)
+                && list
+                    .iter()
+                    .all(|one| original(frame, one.voxel) == Some(one.before) && one.level <= MAX_FILLED)
+        };
+        let has_all = filled.len() == self.frames() && self.cavity == Cavity::Closed;
+        let may_lack = !is_begun || self.cavity == Cavity::Open;
+        (has_all || filled.is_empty() && may_lack) && filled.iter().enumerate().all(is_sound)
+    }
+
     /// Returns a hash of the image, the box, the component and the start, by which [`Self::restore`] recognises whether
     /// a saved run has the same input.
-    fn fingerprint(&self) -> u64 {
+    pub(super) fn input_hash(&self) -> u64 {
         let mut hash = Hash::new();
         let mut mix = |values: &[f64]| values.iter().for_each(|value| hash.mix(value.to_bits()));
         mix(&self.region.to_space.to_cols_array());
@@ -147,6 +183,9 @@ impl SurfaceTracker {
         }
         mix(&self.region.spacing.to_array());
         mix(&[self.region.quantum]);
+        if self.cavity == Cavity::Closed {
+            mix(&[1.0]);
+        }
         if let Component::Nearest(p) = self.component {
             mix(&p.to_array());
         }

@@ -2,6 +2,7 @@
 //! by intensity, and votes for the faces between voxels of different clusters.
 
 use super::region::Region;
+use crate::methods::slices::Pauses;
 use serde::{Deserialize, Serialize};
 use wide::u8x16;
 
@@ -13,6 +14,9 @@ const LANES: usize = u8x16::LANES as usize;
 
 /// Share of the voxels of a window that each of its two clusters, bright and dark, must exceed for a boundary.
 const MIN_SHARE: f64 = 0.1;
+
+/// Number of voxels that count as one unit of work between pauses.
+const VOXELS_PER_UNIT: usize = 8;
 
 /// Maximum number of Lloyd iterations that split a window into two clusters; two to five are usual.
 const ITERATIONS: usize = 50;
@@ -77,15 +81,17 @@ impl BoundaryVoting {
 
     /// Returns the faces between voxels of a frame that have boundary votes, within the processed box, and those in its
     /// sides where they cut bright regions.
-    pub fn faces(&mut self, region: &Region, frame: usize) -> Faces {
+    pub async fn faces(&mut self, region: &Region, frame: usize, pauses: &Pauses) -> Faces {
         let mut faces = Faces::default();
         if region.is_blank(frame) {
             return faces;
         }
         let frames = self.window.frames_with_contrast(region, frame);
-        frames.iter().for_each(|&t| self.ensure_levels(region, t));
+        for &t in &frames {
+            self.ensure_levels(region, t, pauses).await;
+        }
         for direction in [X, Y, Z] {
-            faces[direction] = self.votes(region, frame, frame, direction, &frames);
+            faces[direction] = self.votes(region, [frame; 2], direction, &frames, pauses).await;
         }
         let count = region.frames.len();
         let next = if frame + 1 < count { Some(frame + 1) } else { self.window.cyclic.then_some(0) };
@@ -94,24 +100,26 @@ impl BoundaryVoting {
             // Windows that contain both frames.
             let both: Vec<usize> =
                 self.window.frames_around(next, count).into_iter().filter(|t| frames.contains(t)).collect();
-            faces[TIME] = self.votes(region, frame, next, TIME, &both);
+            faces[TIME] = self.votes(region, [frame, next], TIME, &both, pauses).await;
         }
-        region.clip_to_box(frame, &mut faces);
+        region.clip_to_box(frame, &mut faces, pauses).await;
         faces
     }
 
     /// Returns the largest difference of the two cluster means in a window of any frame, whatever the threshold, in
     /// steps of the quantised intensities; for the error message when no boundary is found.
-    pub fn largest_step(&self, region: &Region) -> f64 {
+    pub async fn largest_step(&self, region: &Region, pauses: &Pauses) -> f64 {
         let mut all = Self::new(Window { threshold: 0.0, ..self.window }, region.frames.len());
-        (0..region.frames.len()).for_each(|frame| drop(all.levels_of(region, frame)));
+        for frame in 0..region.frames.len() {
+            all.levels_of(region, frame, pauses).await;
+        }
         all.largest
     }
 
     /// Computes the levels between bright and dark in all windows centred in a frame, unless they are known.
-    pub fn ensure_levels(&mut self, region: &Region, frame: usize) {
+    pub async fn ensure_levels(&mut self, region: &Region, frame: usize, pauses: &Pauses) {
         if self.levels[frame].is_none() {
-            self.levels[frame] = Some(self.levels_of(region, frame));
+            self.levels[frame] = Some(self.levels_of(region, frame, pauses).await);
         }
     }
 
@@ -124,7 +132,7 @@ impl BoundaryVoting {
 
     /// Computes the level between bright and dark in each window with its centre in a frame, in padded rows (see
     /// [`Rows`]).
-    fn levels_of(&mut self, region: &Region, frame: usize) -> Vec<u8> {
+    async fn levels_of(&mut self, region: &Region, frame: usize, pauses: &Pauses) -> Vec<u8> {
         let [nx, ny, nz] = region.dims;
         let frames: Vec<&[u8]> =
             self.window.frames_with_contrast(region, frame).iter().map(|&t| &region.frames[t][..]).collect();
@@ -142,6 +150,7 @@ impl BoundaryVoting {
                         out[row + x - self.window.half_width] = self.level(&counts);
                     }
                 }
+                pauses.after(nx / VOXELS_PER_UNIT + 1).await;
             }
         }
         out
@@ -164,15 +173,15 @@ impl BoundaryVoting {
     }
 
     /// Returns the faces that have boundary votes between the voxels of `frame` and the next ones along a direction,
-    /// which are in the frame `other` for faces along time. The windows with centres in the frames `frames` are the
+    /// which are in the frame `other`, another one for faces along time. The windows with centres in the frames `frames` are the
     /// ones that vote.
-    fn votes(
+    async fn votes(
         &self,
         region: &Region,
-        frame: usize,
-        other: usize,
+        [frame, other]: [usize; 2],
         direction: usize,
         frames: &[usize],
+        pauses: &Pauses,
     ) -> Vec<Face> {
         let windows = VotingWindows {
             levels: frames.iter().filter_map(|&t| self.levels[t].as_deref()).collect(),
@@ -196,6 +205,7 @@ impl BoundaryVoting {
                     faces.push(Face { voxel: voxel as u32, weight });
                 }
             }
+            pauses.after(nx / VOXELS_PER_UNIT + 1).await;
         }
         faces
     }
@@ -459,6 +469,7 @@ mod tests {
     use super::super::working_space::WorkingSpace;
     use super::*;
     use crate::math::{DAffine3, DVec3, Random};
+    use crate::methods::slices::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -554,7 +565,7 @@ mod tests {
                 .collect();
             let mut voted = 0;
             for t in 0..frames {
-                let faces = voting.faces(&region, t);
+                let faces = finished(voting.faces(&region, t, &Pauses::default()));
                 for direction in [X, Y, Z, TIME] {
                     let next = [1, nx, nx * ny, 0][direction];
                     for i in 0..count {
@@ -594,11 +605,11 @@ mod tests {
         let region = region([9, 9, 9], 2);
         let mut voting =
             BoundaryVoting::new(Window { half_width: 2, frames: 1, threshold: 100.0, cyclic: false }, 2);
-        let faces = voting.faces(&region, 0);
+        let faces = finished(voting.faces(&region, 0, &Pauses::default()));
         assert!(faces.iter().all(Vec::is_empty));
         for threshold in [100.0, 1e6] {
             voting.window.threshold = threshold;
-            let largest = voting.largest_step(&region);
+            let largest = finished(voting.largest_step(&region, &Pauses::default()));
             assert!(largest > 60.0 && largest <= 100.0, "{largest}");
         }
     }

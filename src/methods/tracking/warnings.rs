@@ -3,7 +3,7 @@
 
 use super::SurfaceTracker;
 use super::region::Region;
-use crate::mesh::TriangleMesh;
+use crate::mesh::{TriangleMesh, measure};
 use crate::warning::{Place, Warning, WarningCode};
 
 /// Largest accepted difference between the middles of the intensity steps at the surface in two frames of the same windows,
@@ -15,6 +15,28 @@ const MAX_SHIFT: f64 = 0.3;
 /// Radius of a ball with the volume of the object, in units of the radius of the plane fits, below which its volume is
 /// uncertain: planes fitted to half of a ball and more do not show its curvature. At this radius errors are 5 %.
 const SMALL: f64 = 1.4;
+
+/// Share of the vertices of a surface in the sides of the box, or near them, from which it is cut off there: fewer touch it.
+const CUT: f64 = 0.01;
+
+/// Distance from a side of the box, in voxels, up to which a vertex is in it.
+const NEAR_SIDE: f64 = 0.6;
+
+/// Share of the vertices without a boundary from which a surface is uncertain; surfaces between chambers have a tenth.
+const WITHOUT_BOUNDARY: f64 = 0.3;
+
+/// Ratio of the volume of a frame to those of both frames beside it from which it is no motion of an object; in a heartbeat of
+/// eight frames it is 1.8.
+const JUMP: f64 = 2.0;
+
+/// What warnings tell of the surface in a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct SurfaceFacts {
+    /// Number of handles.
+    genus: u32,
+    /// Whether a side of the box cuts the object.
+    is_cut: bool,
+}
 
 impl SurfaceTracker {
     /// Returns what a user should know about the frames tracked so far, in their order.
@@ -35,10 +57,73 @@ impl SurfaceTracker {
             if is_there {
                 // Steps at the surface of a small object are not those of its boundary.
                 warnings.extend(self.small_object(frame).or_else(|| self.uneven_brightness(frame)));
+                warnings.extend(self.missing_boundary(frame));
+                warnings.extend(self.volume_jump(frame));
             }
         }
         warnings.extend(self.cycle_warning());
+        warnings.extend(self.warning_of_frames(|facts| facts.is_cut, cut_by_box));
+        warnings.extend(self.warning_of_frames(|facts| facts.genus > 0, has_handles));
         warnings
+    }
+
+    /// Returns a warning about the frames of which something is true, placed in the first of them; `None` without any. `text`
+    /// is given the number of these frames.
+    fn warning_of_frames(
+        &self,
+        is_true: impl Fn(&SurfaceFacts) -> bool,
+        text: fn(usize) -> (WarningCode, String),
+    ) -> Option<Warning> {
+        let first = self.facts.iter().position(&is_true)?;
+        let (code, text) = text(self.facts.iter().filter(|facts| is_true(facts)).count());
+        Some(Warning::at(code, Place::Frame(first as u32), text))
+    }
+
+    /// Returns a warning if the image shows no boundary at much of the surface.
+    fn missing_boundary(&self, frame: usize) -> Option<Warning> {
+        let statistics = &self.statistics[frame];
+        // Closed surfaces have about twice as many triangles as vertices.
+        let share = 2.0 * statistics.without_boundary as f64 / statistics.triangles.max(1) as f64;
+        (share > WITHOUT_BOUNDARY).then(|| {
+            let percent = (100.0 * share.min(1.0)) as u32;
+            let text = format!(
+                "the image shows no boundary at {percent} % of the surface, which is a guess there: lower the edge \
+                 threshold, or use another box"
+            );
+            Warning::at(WarningCode::NoBoundary, Place::Frame(frame as u32), text)
+        })
+    }
+
+    /// Returns a warning if the volume differs too much from those of both frames beside it.
+    fn volume_jump(&self, frame: usize) -> Option<Warning> {
+        let [before, now, after] = [frame.checked_sub(1)?, frame, frame + 1].map(|t| {
+            self.statistics.get(t).map(|statistics| statistics.volume).filter(|volume| *volume > 0.0)
+        });
+        let (before, now, after) = (before?, now?, after?);
+        let jumps = now * JUMP < before.min(after) || now > JUMP * before.max(after);
+        jumps.then(|| {
+            let text = format!(
+                "the volume is {now:.4e} between {before:.4e} and {after:.4e} in the frames beside it: the surface may have \
+                 lost a part of the object, or taken in another"
+            );
+            Warning::at(WarningCode::VolumeJump, Place::Frame(frame as u32), text)
+        })
+    }
+
+    /// Returns the facts about the surface of a frame tracked so far.
+    pub(super) fn measured_facts(&self, frame: usize) -> SurfaceFacts {
+        let mesh = &self.meshes[frame];
+        if mesh.triangles.is_empty() {
+            return SurfaceFacts::default();
+        }
+        let measured = measure(mesh);
+        let genus = (2 * measured.components as i64 - measured.euler) / 2;
+        let in_side = mesh.positions.iter().filter(|&&p| {
+            let at = self.region.to_local(p * self.region.space.scale as f32);
+            self.region.is_near_side(at, NEAR_SIDE)
+        });
+        let share = in_side.count() as f64 / mesh.positions.len() as f64;
+        SurfaceFacts { genus: genus.max(0) as u32, is_cut: share >= CUT }
     }
 
     fn has_object(&self, frame: usize) -> bool {
@@ -112,6 +197,21 @@ fn intensities_at(region: &Region, frame: usize, mesh: &TriangleMesh) -> Option<
         }
     }
     (count > 0.0).then(|| sums.map(|sum| sum / count))
+}
+
+fn cut_by_box(frames: usize) -> (WarningCode, String) {
+    let text = format!(
+        "the box cuts the object in {frames} frames, from this one on: its volume is that within the box; use a larger box"
+    );
+    (WarningCode::TouchesBox, text)
+}
+
+fn has_handles(frames: usize) -> (WarningCode, String) {
+    let text = format!(
+        "the surface has handles in {frames} frames, from this one on: muscles that cross the object, or noise; close its cavity, \
+         raise the edge threshold, or use a larger window"
+    );
+    (WarningCode::Handles, text)
 }
 
 fn ends(frame: usize) -> Warning {
