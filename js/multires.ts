@@ -70,12 +70,12 @@ export interface MultiresOptions {
   base?: Mesh;
   /**
    * Initial control ellipsoids: at least one, of which one has to touch the base. With `support: 'surface'` they leave the
-   * surface as it is where they are; if there are none, balls inside it are proposed, see
+   * surface unchanged where they are; if there are none, balls inside it are proposed, see
    * {@link MultiresolutionModel.ellipsoids}.
    */
   ellipsoids?: ControlEllipsoid[];
   /**
-   * What supports the surface. `'membrane'` (default): a membrane over the ellipsoids, as in the paper. `'surface'`:
+   * The support of the surface. `'membrane'` (default): a membrane over the ellipsoids, as in the paper. `'surface'`:
    * `detail` holds itself; it stays exactly as given, whatever closed surface it is, except where ellipsoids are moved,
    * turned or stretched. What one does fades with the distance along the surface, and leaves more than half of its area as
    * it is. No `base` is needed. An ellipsoid stops where the surface would fold up, and becomes its own target there.

@@ -81,8 +81,8 @@ export interface TrackingOptions {
    */
   start?: Mesh;
   /**
-   * What counts as inside of the surface: with `'closed'` (the default) also dark structures within a cavity, such as
-   * papillary muscles and trabeculae, as in clinical measurements; with `'open'` only what is bright, as in the paper. States
+   * The inside of the surface: with `'open'` (the default) only what is bright, as in the paper; with `'closed'`
+   * also dark structures within a cavity, such as papillary muscles and trabeculae, as in clinical measurements. States
    * saved before there was a choice are `'open'`.
    */
   cavity?: 'closed' | 'open';
@@ -90,7 +90,7 @@ export interface TrackingOptions {
   params?: TrackingParams;
 }
 
-/** What is known of an object, for {@link SurfaceTracker.propose}. Give `point` or `box`, or neither: what moves most. */
+/** An object, for {@link SurfaceTracker.propose}: given by `point` or `box`, or by neither, as the one that moves most. */
 export interface ObjectQuery {
   /** A point in the object, world space. */
   point?: Vec3;
@@ -108,6 +108,8 @@ export interface TrackingProposal {
     voxels: { min: Vec3; max: Vec3 };
     /** Point in the middle of the object in the first frame that has it, world space. */
     component: Vec3;
+    /** Muscles within a chamber of a heart count as blood. */
+    cavity: 'closed';
     params: {
       /** Edge threshold, intensity units. */
       threshold: number;
@@ -217,7 +219,7 @@ export class SurfaceTracker implements Stepper {
    * sequence, yielding to the event loop between slices of work: `new SurfaceTracker({ volume, ...proposal.options })`. Slices
    * far apart should have others inserted between them before, by {@link Volume.enrichSlices}.
    *
-   * @param query - What is known of the object; default nothing: what moves most.
+   * @param query - A point of the object or a box around it; by default the object that moves most.
    * @param options - `signal`: aborts the work; `budgetMs`: duration of a slice, milliseconds, default 12.
    * @throws {@link VesicleError} `invalid-argument` with the reason why there is no proposal: naming `point` if there is no
    *   bright object with darker surroundings, `frame`, or `box` or `volume` if nothing moves there, or there is one frame;
@@ -461,7 +463,7 @@ function isClosedCavity(cavity: TrackingOptions['cavity']): boolean {
   if (cavity !== undefined && cavity !== 'closed' && cavity !== 'open') {
     throw invalid('cavity', `must be 'closed' or 'open', got '${String(cavity)}'`);
   }
-  return cavity !== 'open';
+  return cavity === 'closed';
 }
 
 function point(component: TrackingOptions['component']): Float64Array | undefined {

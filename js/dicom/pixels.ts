@@ -20,6 +20,18 @@ export function arrayOf({ bitsAllocated, signed, float }: PixelFormat): new (len
   return signed ? Int32Array : Uint32Array;
 }
 
+/** Throws `bad-file` unless the file of an image that is not compressed has all of its bytes. */
+export function checkLength({ file, index, pixelsAt, pixelsEnd, format }: Frame): void {
+  if (!PLAIN.includes(format.transferSyntax)) return;
+  const size = (format.rows * format.columns * format.bitsAllocated) / 8;
+  const [from, to] = [pixelsAt + Math.floor(index * size), pixelsAt + Math.ceil((index + 1) * size)];
+  if (to > pixelsEnd)
+    throw badDicom(
+      file.name,
+      `pixel data: needs ${Math.ceil(size)} bytes, has ${Math.max(0, Math.min(to, pixelsEnd) - from)}`,
+    );
+}
+
 /** Reads the voxels of images; keeps the file of the last one, if that is compressed and has several. */
 export class PixelReader {
   readonly #parser: Parser;

@@ -11,7 +11,7 @@ import { badDicom, listed } from './error.js';
 import { affineOf, distancesOf, evennessOf } from './geometry.js';
 import type { Stack } from './grouping.js';
 import type { Parser } from './parser.js';
-import { arrayOf, PixelReader } from './pixels.js';
+import { arrayOf, checkLength, PixelReader } from './pixels.js';
 import { secondsOf } from './time.js';
 import type { Frame, Segment, Series } from './types.js';
 
@@ -147,12 +147,16 @@ export const reader = (text: string): Warning => ({ code: 'reader', text });
 const FREE_BYTES = 2 ** 29;
 const BYTES_PER_BYTE = 5000;
 
-/** Returns an array of voxels; throws `too-large` if there is no memory for it, or its files cannot hold so many. */
+/**
+ * Returns an array of voxels; throws `bad-file` if frames lack bytes, `too-large` if there is no memory for it, or its files
+ * cannot hold so many.
+ */
 export function allocated(
   Kind: new (length: number) => VoxelArray,
   length: number,
   frames: readonly Frame[],
 ): VoxelArray {
+  for (const frame of frames) checkLength(frame);
   const stored = [...new Set(frames.map(({ file }) => file))].reduce((sum, { size }) => sum + size, 0);
   const bytes = length * new Kind(0).BYTES_PER_ELEMENT;
   if (bytes > Math.max(FREE_BYTES, BYTES_PER_BYTE * stored))

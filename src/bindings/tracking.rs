@@ -151,6 +151,7 @@ struct ProposalCopy {
 struct ProposedOptions {
     voxels: VoxelEnds,
     component: [f64; 3],
+    cavity: &'static str,
     params: ProposedParams,
 }
 
@@ -171,6 +172,7 @@ impl From<Proposal> for ProposalCopy {
         let options = ProposedOptions {
             voxels: VoxelEnds { min, max },
             component: proposal.component.to_array(),
+            cavity: "closed",
             params: ProposedParams { threshold: proposal.threshold },
         };
         Self { options, frame: proposal.frame }

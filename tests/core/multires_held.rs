@@ -190,7 +190,7 @@ fn a_saved_run_goes_on_at_the_same_bits() {
         finish(model);
     }
     assert!(other.surface().positions == model.surface().positions);
-    // Damaged bytes are refused, and leave the run as it is.
+    // Damaged bytes are refused, and leave the run unchanged.
     let before = other.save();
     for k in (8..saved.len()).step_by(saved.len() / 300) {
         let mut damaged = saved.clone();

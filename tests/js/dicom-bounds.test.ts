@@ -108,6 +108,20 @@ describe('files of very many', () => {
     expect(reasons(listing)[99]).toMatch(/pixel data: 100000 images need 100000 bytes, it has 10/);
   });
 
+  test('voxels that they do not have take no memory', async () => {
+    const listing = await openDicom(
+      [0, 1].map((z) => {
+        const more = [textElement('00080018', 'UI', `1.${z}`)];
+        const large = { rows: 11_008, columns: 24_415, pixels: Buffer.alloc(2) };
+        return file(image({ ...large, position: `0\\0\\${z}`, more }), z);
+      }),
+    );
+    const before = process.memoryUsage().arrayBuffers;
+    const refusal = await rejection(listing.volumes[0]?.read() as Promise<unknown>);
+    expect(refusal).toMatchObject({ code: 'bad-file', message: expect.stringMatching(/needs 268760320 bytes, has 2/) });
+    expect(process.memoryUsage().arrayBuffers - before).toBeLessThan(1e6);
+  });
+
   test('frames of a bit, several of them, are skipped', async () => {
     const bits = Array.from({ length: 7 }, (_, k) => {
       const uid = textElement('00080018', 'UI', `1.2.${k}`);

@@ -108,6 +108,35 @@ test('texture coordinates move with the surface', () => {
   }
 });
 
+test('a surface that holds itself rests as given, and follows the ellipsoids proposed for it', async () => {
+  const detail = wavy();
+  const given = [...detail.arrays().positions];
+  const { ellipsoids: _, ...options } = { ellipsoids: undefined, detail, support: 'surface' as const };
+  const made = new MultiresolutionModel(options);
+  models.push(made);
+  expect((await made.run()).done).toBe(true);
+  expect([...made.mesh.arrays().positions]).toEqual(given);
+  const rest = made.ellipsoids;
+  expect(rest.length).toBeGreaterThan(0);
+  const [first] = rest as [ControlEllipsoid];
+  const center: [number, number, number] = [first.center[0], first.center[1], first.center[2] + 0.2];
+  made.setEllipsoids([{ ...first, center }, ...rest.slice(1)]);
+  expect(await made.run()).toMatchObject({ done: true, components: 1, euler: 2 });
+  expect(made.mesh.check()).toEqual(HEALTHY);
+  expect([...made.mesh.arrays().positions]).not.toEqual(given);
+  const other = model({ ...options, ellipsoids: rest });
+  other.restore(made.save());
+  expect(other.save()).toEqual(made.save());
+  made.setEllipsoids(rest);
+  await made.run();
+  expect([...made.mesh.arrays().positions]).toEqual(given);
+  const refused = failure(() => model({ support: 'none' as never }));
+  expect(refused).toMatchObject({ code: 'invalid-argument' });
+  expect(refused.message).toMatch(/^support/);
+  expect(failure(() => model({ support: 'surface' })).message).toMatch(/^support.*detail/);
+  detail.free();
+});
+
 test('a state is restored bit for bit', () => {
   const skin = model();
   skin.setEllipsoids([ball(-0.5, 1), ball(1.4, 0.8)]);

@@ -701,6 +701,7 @@ test('one point, a box or nothing is enough to propose options, with which the b
     expect(apart(options.component, MIDDLE)).toBeLessThan(6);
     expect(options.params.threshold).toBeGreaterThan(30);
     expect(options.params.threshold).toBeLessThan(100);
+    expect(options.cavity).toBe('closed');
     for (const k of [0, 1, 2] as const) {
       expect(options.voxels.min[k]).toBeLessThan(3);
       expect(options.voxels.max[k]).toBeGreaterThan(16);
@@ -734,7 +735,7 @@ test('muscles in a cavity are inside of it if it is closed, and states say which
   const volumes = [closed, open].map((one) => one?.volumes()[0] as number);
   expect((volumes[0] as number) / (volumes[1] as number)).toBeGreaterThan(1.05);
   expect(failure(() => open?.restore(closed?.save() as Uint8Array)).code).toBe('bad-file');
-  const again = tracker({ volume: pierced() });
+  const again = tracker({ volume: pierced(), cavity: 'closed' });
   again.restore(closed?.save() as Uint8Array);
   expect(bytesOfAll(again).equals(bytesOfAll(closed as SurfaceTracker))).toBe(true);
 });

@@ -4,7 +4,7 @@ use super::ellipsoid::Ellipsoid;
 use crate::math::{DVec3, spread_directions};
 use crate::spatial::{SurfacePoint, SurfaceWalker};
 
-/// Number of directions in which the surface around an ellipsoid is looked for.
+/// Number of directions in which the surface around an ellipsoid is searched for.
 const DIRECTIONS: usize = 256;
 
 /// Returns the vertices of a surface around an ellipsoid, each with a bound of its distance from the ellipsoid.

@@ -11,7 +11,7 @@ const ROUNDING: f64 = 1e-9;
 /// Distances from a handle below this share of its reach count as none, so that votes are finite.
 const NEAREST: f64 = 1e-3;
 
-/// An ellipsoid with the pose in which it leaves the surface as it is.
+/// An ellipsoid with the pose in which it leaves the surface unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Handle {
     pub rest: Ellipsoid,

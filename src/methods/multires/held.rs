@@ -1,4 +1,4 @@
-//! A surface that holds itself: it stays as it was given, except where ellipsoids move it as handles.
+//! A surface that holds itself: it is unchanged except where ellipsoids move it as handles.
 //!
 //! Other than the membrane of the paper, which only the ellipsoids support, it needs no base over which the whole surface
 //! is a graph. Each point keeps its place on the given surface (the map T), from which its position follows: what the
@@ -49,17 +49,17 @@ const MOST_ADDED: usize = 15_000;
 /// Maximum number of passes in which edges of the given surface are halved: each halves the longest.
 const PASSES: usize = 40;
 
-/// A surface with the place of each vertex on the given one.
+/// A surface with the point of the given one for each vertex.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Placed {
     pub mesh: Mesh,
-    /// The map T: the place of each vertex on the given surface, by slot.
+    /// The map T: the point of the given surface for each vertex, by slot.
     pub points: Correspondence,
     /// The distance of each vertex from each handle along the given surface, by slot, handle by handle.
     pub distances: Vec<f32>,
 }
 
-/// What the handles of a surface need: their poses, and the surface that they leave as it is.
+/// The handles of a surface: their poses, and the surface without their effect.
 #[derive(Clone, Debug)]
 pub(super) struct Held {
     pub handles: Vec<Handle>,
@@ -78,7 +78,7 @@ pub(super) struct Held {
     pub is_unsettled: bool,
 }
 
-/// What is saved of the handles.
+/// Handles as they are saved.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct SavedHandles {
     handles: Vec<Handle>,
@@ -137,7 +137,7 @@ impl Held {
         self.handles.iter_mut().zip(poses).for_each(|(handle, &pose)| handle.move_to(pose));
     }
 
-    /// Adds a handle that leaves the surface as it is `now` near its pose; distances from it are added to `now`.
+    /// Adds a handle with a pose in which it leaves the surface `now` unchanged; distances from it are added to `now`.
     ///
     /// # Errors
     /// [`MeshError`] if memory does not suffice.
@@ -324,7 +324,7 @@ impl MultiresolutionModel {
         Changes { creations: splits as u32, ..Changes::default() }
     }
 
-    /// Shows the surface as given if all handles are at rest, else as they have moved it.
+    /// Shows the surface as given if all handles have their poses at rest, else as they have moved it.
     pub(super) fn show_held(&mut self) {
         let Some(held) = &self.held else { return };
         let (mesh, points) = if held.is_at_rest() {
@@ -379,7 +379,7 @@ fn replacement(mut mesh: Mesh, replaced: &Mesh) -> Mesh {
     mesh
 }
 
-/// Returns the pose in which a handle leaves the surface as it was before a motion, if it does so now.
+/// Returns the pose in which a handle had no effect before a motion, if it has none now.
 fn pose_before(now: &Ellipsoid, motion: &Motion) -> Ellipsoid {
     let rotation = motion.turn.transpose() * now.rotation;
     super::ellipsoid::Shape { center: motion.inverse_of(now.center), rotation, lengths: now.lengths }.into()

@@ -7,7 +7,7 @@
 //! (`correspondence`; section 3), where λ is sampled to reconstruct the detail on S (section 6). Without detail the
 //! model is a lava lamp.
 //!
-//! Instead, a surface can hold itself (`held`): it stays as it is given, except where ellipsoids (`grip`, `handles`;
+//! Instead, a surface can hold itself (`held`): it is unchanged except where ellipsoids (`grip`, `handles`;
 //! proposed by `proposal`) move it. The membrane has no part in it.
 //!
 //! # Guarantees
@@ -71,7 +71,7 @@ pub struct MultiresOptions {
     /// The control ellipsoids, at their initial positions: those that the membrane is spanned over, at least one, or those
     /// that leave a surface that holds itself as it is. If there are none for the latter, balls inside it are proposed.
     pub ellipsoids: Vec<ControlEllipsoid>,
-    /// What supports the surface.
+    /// The support of the surface.
     pub support: Support,
     /// The parameters. If both edge bounds are 0, they are derived from the area of the base, else of the detail, else
     /// of the ellipsoids; a single one that is 0 is derived from the other.

@@ -112,7 +112,7 @@ choices! {
 }
 
 choices! {
-    /// What supports the surface of a multiresolution model.
+    /// The support of the surface of a multiresolution model.
     #[derive(Default)]
     pub enum Support {
         /// A membrane over the ellipsoids, as in Kobbelt, Bareuther & Seidel.

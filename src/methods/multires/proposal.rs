@@ -4,7 +4,7 @@ use super::ControlEllipsoid;
 use super::detail::Band;
 use crate::math::{Bounds, DVec3, Vec3, triangle};
 
-/// Number of places of the surface at which a ball inside is looked for.
+/// Number of points of the surface at which a ball inside is searched for.
 const PLACES: usize = 1500;
 /// Largest number of ellipsoids that are proposed.
 const MOST: usize = 6;

@@ -29,7 +29,7 @@ const MIN_DEPTH: f32 = 1.25;
 const RIM: f32 = 1.5;
 
 /// Edge threshold, in standard deviations of the noise, below which intensities are smoothed, along axes with sides of voxels
-/// up to so many times the shortest.
+/// up to this multiple of the shortest.
 const MANY_NOISES: f64 = 6.0;
 const LONGEST: f64 = 1.5;
 

@@ -7,7 +7,7 @@ use crate::methods::MethodError;
 use crate::methods::slices::Pauses;
 use crate::volume::{Region, Volume};
 
-/// Largest number of voxels, of all frames together, that are looked at: in some seconds. Of a larger sequence, every other
+/// Largest number of voxels, of all frames together, that are visited: in some seconds. Of a larger sequence, every other
 /// one is left out along the axis along which they are closest, again and again.
 const MAX_VOXELS: usize = 16_000_000;
 

@@ -80,7 +80,7 @@ pub enum Bounds {
     Voxels([[usize; 3]; 2]),
 }
 
-/// What [`SurfaceTracker::propose`] is told about an object.
+/// An object, for [`SurfaceTracker::propose`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Query {
     /// A point in the object, in world coordinates, in a frame.
@@ -111,14 +111,14 @@ pub struct Proposal {
     pub threshold: f64,
 }
 
-/// What counts as inside of a cavity.
+/// The inside of a cavity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Cavity {
     /// Dark structures within it, such as muscles in a chamber of the heart, and the furrows between those along its wall:
     /// its volume is what clinical measurements give. Convex objects without any are as they are.
-    #[default]
     Closed,
-    /// What is bright only, as in the paper.
+    /// Bright voxels only, as in the paper.
+    #[default]
     Open,
 }
 
@@ -135,7 +135,7 @@ pub struct TrackingOptions {
     /// The surface in the first frame, from which tracking starts, in world coordinates; by default it is extracted
     /// from the image.
     pub start: Option<TriangleMesh>,
-    /// What counts as inside of the tracked surface.
+    /// The inside of the tracked surface.
     pub cavity: Cavity,
     /// The initial parameters; `threshold`, `radius` and `time_scale` are derived from the volume if they are 0.
     pub params: TrackingParams,
@@ -178,7 +178,7 @@ pub struct SurfaceTracker {
     replaced_faces: Option<(usize, Faces)>,
     /// By frame, the mean intensities inside and outside of its surface, in steps of the quantised intensities.
     intensities_at_surface: Vec<Option<[f64; 2]>>,
-    /// What warnings tell of the surface in each frame tracked so far.
+    /// Facts for warnings about the surface in each frame tracked so far.
     facts: Vec<SurfaceFacts>,
     /// `None` until it is known, NaN where it is not defined.
     cycle_closure_error: Option<f64>,

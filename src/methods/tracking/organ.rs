@@ -26,7 +26,7 @@ pub(super) struct Organ {
 }
 
 impl Organ {
-    /// Returns the object around a bright voxel of a frame, and the follower of it; `None` if the voxel is dark.
+    /// Returns the object around a bright voxel of a frame, and the search that follows it; `None` if the voxel is dark.
     pub async fn around(
         lattice: Lattice,
         bright: &[bool],

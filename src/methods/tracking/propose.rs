@@ -2,7 +2,7 @@
 //!
 //! Balls around the point grow until the intensities in them, in all frames, are of two kinds. What is brighter than
 //! halfway between the point and the darker kind is bright, and the object is the bright region around the point, followed
-//! through all frames. Without a point, what moves most in the sequence is looked for.
+//! through all frames. Without a point, the object that moves most in the sequence is searched for.
 
 use super::coarse::CoarseSequence;
 use super::lattice::Lattice;
@@ -31,7 +31,7 @@ const DARK_SHARE: std::ops::RangeInclusive<f64> = 0.2..=0.9;
 const MIN_STEP_IN_NOISE: f64 = 4.0;
 const MIN_STEP: f64 = 0.1;
 
-/// Half the side of the box around the point in which the object is looked for, in units of the radius of the ball whose
+/// Half the side of the box around the point in which the object is searched for, in units of the radius of the ball whose
 /// voxels are of two kinds: an object is up to that much longer than it is wide.
 const WINDOW: f64 = 5.0;
 
@@ -137,7 +137,7 @@ fn given_voxel(
 
 /// The quantised intensities that separate an object from its surroundings, and the part of the sequence that it is in.
 struct Levels {
-    /// What is above is bright.
+    /// Intensities above it are bright.
     level: f32,
     /// The radius of the ball around the point in which there are bright and dark voxels.
     ball: f64,
@@ -338,7 +338,7 @@ impl Sums {
     }
 }
 
-/// The part of a sequence in which an object is looked for.
+/// The part of a sequence in which an object is searched for.
 struct Window {
     lattice: Lattice,
     first: [usize; 3],

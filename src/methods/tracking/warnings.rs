@@ -29,7 +29,7 @@ const WITHOUT_BOUNDARY: f64 = 0.3;
 /// eight frames it is 1.8.
 const JUMP: f64 = 2.0;
 
-/// What warnings tell of the surface in a frame.
+/// Facts for warnings about the surface in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct SurfaceFacts {
     /// Number of handles.

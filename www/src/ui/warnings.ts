@@ -11,10 +11,14 @@ const LONG = 4;
 const OF_RESULTS: readonly string[] = [
   'begins-in-frame',
   'ends-in-frame',
+  'handles',
+  'no-boundary',
   'small-object',
   'thin-label',
   'thin-parts',
+  'touches-box',
   'uneven-brightness',
+  'volume-jump',
 ];
 
 /** A report of a run, of which only the warnings matter. */
