@@ -288,7 +288,7 @@ fn random_poses_leave_the_surface_valid() {
         let rest = model.ellipsoids();
         for _ in 0..3 {
             let params = MultiresParams { edge_min: 0.0, edge_max: 0.0, ..MultiresParams::default() };
-            let edge = size * random.within(0.02, 0.1);
+            let edge = size * random.within(0.006, 0.02);
             model.set_params(params.with_target(edge)).unwrap();
             model.set_ellipsoids(&random_pose(random, &rest, size)).unwrap();
             for _ in 0..1 + random.below(8) {

@@ -190,6 +190,23 @@ fn where_nothing_can_be_proposed_the_error_says_why() {
     assert!(unmoved.0 == "volume" && unmoved.1.contains("moves"), "{unmoved:?}");
 }
 
+/// Bright tissue all around, with dark columns in it.
+#[test]
+fn what_goes_on_through_the_image_is_refused() {
+    let dims = [48_usize, 48, 20];
+    let value = |i: usize| {
+        let [x, y] = [i % dims[0], i / dims[0] % dims[1]].map(|n| (n % 16) as f64 - 8.0);
+        if libm::hypot(x, y) < 4.5 { 20.0 } else { 200.0 }
+    };
+    let frame: Vec<f32> = (0..dims.iter().product()).map(|i| value(i) as f32).collect();
+    let init = VolumeInit::new(Voxels::F32([frame.clone(), frame].concat()), [48, 48, 20, 2]);
+    let volume = Volume::new(init).unwrap();
+    let query = Query::Point { at: DVec3::new(16.0, 16.0, 10.0), frame: 0 };
+    let refusal = SurfaceTracker::propose(&volume, query).unwrap_err();
+    let MethodError::InvalidArgument { parameter, problem } = refusal else { panic!("{refusal:?}") };
+    assert!(parameter == "point" && problem.contains("most of the image"), "{problem}");
+}
+
 #[test]
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn a_closed_cavity_has_the_volume_of_the_ball_and_an_open_one_a_hole() {

@@ -45,6 +45,9 @@ const THRESHOLD: f64 = 0.6;
 const MARGIN: f64 = 0.2;
 const MARGIN_IN_VOXELS: usize = 3;
 
+/// Number of the six ends of the image at which an object has gone on into its surroundings.
+const LEAK: usize = 4;
+
 /// Distance from the object, in units of the shortest side of a voxel, up to which dark voxels are its surroundings.
 const SURROUNDINGS: f32 = 3.0;
 
@@ -86,6 +89,9 @@ impl SurfaceTracker {
         let levels = levels.ok_or_else(|| no_object(query))?;
         let found = Found::followed(&sequence, voxel, frame, &levels, &pauses).await;
         let found = found.ok_or_else(|| no_object(query))?;
+        if found.ends_of_image(&sequence) >= LEAK {
+            return Err(everywhere(query));
+        }
         Ok(Proposal {
             bounds: found.bounds(&sequence, ends),
             component: sequence.point_of(&volume, found.middle),
@@ -112,6 +118,11 @@ fn no_object(query: Query) -> MethodError {
         }
         _ => "has no bright object that moves: give a point in it",
     };
+    MethodError::invalid(parameter(query), problem)
+}
+
+fn everywhere(query: Query) -> MethodError {
+    let problem = "the bright region goes on through most of the image: give a box around the object";
     MethodError::invalid(parameter(query), problem)
 }
 
@@ -280,6 +291,14 @@ impl Found {
         let ends = window.lattice.bounds(&union)?.map(|at| window.in_sequence(at));
         let [inside, outside] = sums.means()?;
         Some(Self { frame: first, middle, ends, inside, outside })
+    }
+
+    /// Returns the number of ends of the image that the object reaches, along axes with more than one voxel.
+    fn ends_of_image(&self, sequence: &CoarseSequence) -> usize {
+        let [first, last] = self.ends;
+        let dims = sequence.lattice.dims;
+        let reached = |k: usize| usize::from(first[k] == 0) + usize::from(last[k] + 1 == dims[k]);
+        (0..3).filter(|&k| dims[k] > 1).map(reached).sum()
     }
 
     /// Returns the first and the last voxel of the volume in the box with the object and a margin, within `within`.
