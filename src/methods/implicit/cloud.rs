@@ -1,7 +1,7 @@
 //! Input points of an implicit surface: validation, scaling into the normalised box, in which their longest side is 2,
 //! removal of duplicates, and clustering against outliers (Dinh, Turk & Slabaugh, section VI-D).
 
-use crate::math::order::{median, sort_by_rank, sort_distinct, sort_triples};
+use crate::math::order::{sort_by_rank, sort_distinct, sort_triples};
 use crate::math::{Bounds, DAffine3, DMat3, DVec3, PositionIndex, Vec3, symmetric};
 use crate::methods::MethodError;
 
@@ -122,21 +122,6 @@ impl Cloud {
             return Err(MethodError::invalid("points", "all lie in one plane; they have to span a volume"));
         }
         Ok(())
-    }
-
-    /// Returns the cloud of the points in the `keep` largest clusters, in the same order, to discard outliers.
-    ///
-    /// # Errors
-    /// [`MethodError::InvalidArgument`] if too few points are left, or all of them lie in one plane.
-    pub fn largest_clusters(&self, keep: usize) -> Result<Self, MethodError> {
-        // Scaled, but not moved: between far outliers, rounding would move the others together.
-        let scale = BoxMap::of(&self.points).scale();
-        let points: Vec<Vec3> = self.points.iter().map(|p| (p.as_dvec3() * scale).as_vec3()).collect();
-        let cell = CLUSTER_CELL * usual_spacing(&points);
-        let kept = self.select(&largest_clusters(&points, cell as f32, keep));
-        kept.check_count()?;
-        kept.check_span()?;
-        Ok(kept)
     }
 
     /// Returns the cloud with its points mapped by `map` from world units into the normalised box. Normals are
@@ -260,26 +245,10 @@ impl BoxMap {
 /// Returns the mean distance from a point to its nearest neighbour, in the units of `points`, estimated from at most
 /// 4000 of them. There must be at least two points. It is the unit of search radii and cell sizes.
 pub fn mean_spacing(points: &[Vec3]) -> f64 {
-    mean(nearest_distances(points).iter().copied())
-}
-
-/// Returns what [`mean_spacing`] returns, but without the distances of outliers.
-fn usual_spacing(points: &[Vec3]) -> f64 {
-    let distances = nearest_distances(points);
-    let most = OUTLYING * f64::from(median(distances.iter().map(|&d| d as f32)).unwrap_or(0.0));
-    mean(distances.into_iter().filter(|&d| d <= most))
-}
-
-fn mean(numbers: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = numbers.fold((0.0, 0), |(sum, count), x| (sum + x, count + 1));
-    sum / f64::from(count)
-}
-
-/// Returns the distances of at most 4000 of `points` to their nearest neighbours.
-fn nearest_distances(points: &[Vec3]) -> Vec<f64> {
     let tree =
         crate::math::BoxTree::new(&points.iter().map(|&p| Bounds { min: p, max: p }).collect::<Vec<_>>());
     let step = points.len().div_ceil(SPACING_SAMPLE);
+    let sampled = (0..points.len()).step_by(step);
     let distance = |i: usize| {
         let mut best = f64::INFINITY;
         tree.nearest(points[i], |j, bound| {
@@ -289,21 +258,17 @@ fn nearest_distances(points: &[Vec3]) -> Vec<f64> {
         });
         best.sqrt()
     };
-    (0..points.len()).step_by(step).map(distance).collect()
+    let count = sampled.len();
+    sampled.map(distance).sum::<f64>() / count as f64
 }
 
 /// Maximum number of points from which [`mean_spacing`] is estimated: enough for an error of a hundredth.
 const SPACING_SAMPLE: usize = 4000;
-/// Distance to the nearest neighbour, in medians, above which a point is an outlier.
-const OUTLYING: f64 = 10.0;
-/// Edge length of the grid cells by which points are grouped into clusters, in mean spacings of the points: the points
-/// of touching cells are in one cluster.
-const CLUSTER_CELL: f64 = 2.0;
 
 /// Returns the indices of the points in the `keep` largest clusters, in ascending order, to discard outliers. Points
 /// belong to one cluster if their grid cells, with edges of length `cell`, are linked by a chain of cells with points
 /// that touch, even at a corner.
-fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
+pub fn largest_clusters(points: &[Vec3], cell: f32, keep: usize) -> Vec<u32> {
     let clusters = clusters(points, cell);
     let mut largest: Vec<&[u32]> = clusters.iter().map(Vec::as_slice).collect();
     sort_by_rank(&mut largest, |cluster| (points.len() - cluster.len()) as u64);

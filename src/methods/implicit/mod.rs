@@ -90,8 +90,7 @@ pub struct ImplicitOptions {
     pub cameras: Vec<Camera>,
     /// Maximum number of points that become surface constraints; larger clouds are subsampled.
     pub max_points: usize,
-    /// Number of clusters of nearby points to keep, largest first, which discards outliers: the normalised box is that of
-    /// the points kept, and the rest is ignored. `None` keeps all clusters.
+    /// Number of clusters of nearby points to keep, largest first, which discards outliers; `None` keeps all clusters.
     pub keep_components: Option<usize>,
     /// Initial parameters of kernel, regularisation, solver and extraction.
     pub params: ImplicitParams,
@@ -123,10 +122,8 @@ pub struct ImplicitSurface {
     origin: DVec3,
     /// The input points, in world units.
     original: Vec<Vec3>,
-    /// The input points without duplicates and outliers, mapped into the normalised box.
+    /// The input points without duplicates, mapped into the normalised box.
     cloud: Cloud,
-    /// Number of distinct input points that are outliers.
-    outliers: usize,
     map: BoxMap,
     options: ImplicitOptions,
     params: ImplicitParams,
@@ -237,21 +234,15 @@ impl ImplicitSurface {
         points.validate()?;
         options.cameras = cameras_at(points.origin, options.cameras);
         let original = points.points.clone();
-        let distinct = points.distinct();
-        distinct.check_count()?;
-        BoxMap::of(&distinct.points).check_precision()?;
-        let cloud = match options.keep_components {
-            Some(keep) => distinct.largest_clusters(keep)?,
-            None => distinct.clone(),
-        };
-        let outliers = distinct.len() - cloud.len();
+        let cloud = points.distinct();
+        cloud.check_count()?;
         let map = BoxMap::of(&cloud.points);
         map.check_precision()?;
         // Rounding in the box can make distinct points equal.
         let cloud = cloud.mapped(&map).distinct();
         cloud.check_count()?;
         cloud.check_span()?;
-        Ok(Self { outliers, ..Self::from_parts(original, cloud, map, options) })
+        Ok(Self::from_parts(original, cloud, map, options))
     }
 
     fn from_parts(original: Vec<Vec3>, cloud: Cloud, map: BoxMap, options: ImplicitOptions) -> Self {
@@ -259,7 +250,6 @@ impl ImplicitSurface {
             origin: cloud.origin,
             original,
             cloud,
-            outliers: 0,
             map,
             params: options.params.clone(),
             edits: PointEdits::default(),
@@ -698,13 +688,7 @@ impl ImplicitSurface {
     /// Returns the number of input points that are ignored because they equal another one, exactly or after rounding to
     /// single precision in the normalised box.
     pub fn duplicates(&self) -> usize {
-        self.original.len() - self.cloud.len() - self.outliers
-    }
-
-    /// Returns the number of distinct input points that are ignored because they belong to none of the clusters that
-    /// [`ImplicitOptions::keep_components`] keeps.
-    pub fn outliers(&self) -> usize {
-        self.outliers
+        self.original.len() - self.cloud.len()
     }
 
     /// Returns the mean distance from a sampled point to its nearest neighbour, estimated from at most 4000 samples, in
@@ -747,7 +731,7 @@ fn cameras_at(origin: DVec3, cameras: Vec<Camera>) -> Vec<Camera> {
 }
 
 fn first_stage(options: &ImplicitOptions) -> Stage {
-    Stage::Subsample(Box::new(Sampling::new(options.max_points, SEED)))
+    Stage::Subsample(Box::new(Sampling::new(options.keep_components, options.max_points, SEED)))
 }
 
 fn check_options(options: &ImplicitOptions) -> Result<(), MethodError> {

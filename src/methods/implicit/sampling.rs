@@ -2,11 +2,14 @@
 //! milliseconds of work (Dinh, Turk & Slabaugh, section VI-B).
 
 use super::automatic::Choice;
-use super::cloud::{Cloud, mean_spacing};
+use super::cloud::{Cloud, largest_clusters, mean_spacing};
 use crate::math::{Random, Vec3};
 use crate::methods::MethodError;
 use crate::spatial::PointGrid;
 
+/// Edge length of the grid cells by which points are grouped into clusters, in mean spacings of the points: the points
+/// of touching cells are in one cluster.
+const CLUSTER_CELL: f64 = 2.0;
 /// Number of points visited in one call of [`Sampling::advance`], which then takes about ten milliseconds.
 const SLICE: usize = 50_000;
 /// Maximum number of radii that are tried in Poisson-disc sampling, to find one that leaves the wanted number of
@@ -31,15 +34,18 @@ pub struct Samples {
 /// Selection of the points of a cloud that become surface constraints, in slices of about ten milliseconds of work.
 #[derive(Clone, Debug)]
 pub struct Sampling {
+    /// Number of clusters of points to keep, largest first, to discard outliers; `None` keeps all points.
+    keep: Option<usize>,
     most: usize,
     seed: u64,
-    poisson_disc: Option<PoissonDisc>,
+    poisson_disc: Option<(Cloud, PoissonDisc)>,
 }
 
 impl Sampling {
-    /// Starts the selection of at most `most` points; `seed` determines the random order.
-    pub fn new(most: usize, seed: u64) -> Self {
-        Self { most, seed, poisson_disc: None }
+    /// Starts the selection of at most `most` points from the `keep` largest clusters of points, or from all points if
+    /// `keep` is `None`; `seed` determines the random order.
+    pub fn new(keep: Option<usize>, most: usize, seed: u64) -> Self {
+        Self { keep, most, seed, poisson_disc: None }
     }
 
     /// Continues the selection from `cloud` by one slice of work; it must be the same cloud in all calls. Returns the
@@ -48,20 +54,33 @@ impl Sampling {
     /// # Errors
     /// [`MethodError::InvalidArgument`] if too few points are left, or all of them lie in one plane.
     pub fn advance(&mut self, cloud: &Cloud) -> Result<Option<Samples>, MethodError> {
-        let Some(poisson_disc) = &mut self.poisson_disc else {
-            self.poisson_disc = Some(PoissonDisc::new(&cloud.points, self.most, self.seed));
+        let Some((kept, poisson_disc)) = &mut self.poisson_disc else {
+            let kept = match self.keep {
+                Some(keep) => Self::largest(cloud, keep)?,
+                None => cloud.clone(),
+            };
+            let poisson_disc = PoissonDisc::new(&kept.points, self.most, self.seed);
+            self.poisson_disc = Some((kept, poisson_disc));
             return Ok(None);
         };
-        let Some(chosen) = poisson_disc.advance(&cloud.points, SLICE) else { return Ok(None) };
-        let cloud = cloud.select(&chosen);
+        let Some(chosen) = poisson_disc.advance(&kept.points, SLICE) else { return Ok(None) };
+        let cloud = kept.select(&chosen);
         cloud.check_span()?;
         let spacing = mean_spacing(&cloud.points);
         Ok(Some(Samples { spacing, choice: Choice::of(&cloud.points, spacing), cloud }))
     }
 
+    fn largest(cloud: &Cloud, keep: usize) -> Result<Cloud, MethodError> {
+        let cell = CLUSTER_CELL * mean_spacing(&cloud.points);
+        let kept = cloud.select(&largest_clusters(&cloud.points, cell as f32, keep));
+        kept.check_count()?;
+        kept.check_span()?;
+        Ok(kept)
+    }
+
     /// Returns the approximate share of the selection that is done, 0 to 1, for progress bars.
     pub fn progress(&self) -> f64 {
-        self.poisson_disc.as_ref().map_or(0.0, PoissonDisc::progress)
+        self.poisson_disc.as_ref().map_or(0.0, |(_, poisson_disc)| poisson_disc.progress())
     }
 }
 

@@ -168,8 +168,7 @@ impl ImplicitSurface {
 
     fn restarted(&self) -> Self {
         let (original, cloud) = (self.original.clone(), self.cloud.clone());
-        let start = Self::from_parts(original, cloud, self.map, self.options.clone());
-        Self { clock: self.clock, outliers: self.outliers, ..start }
+        Self { clock: self.clock, ..Self::from_parts(original, cloud, self.map, self.options.clone()) }
     }
 
     /// Recomputes what a saved state does not store: everything up to the stage `saved_stage`, and that stage up to the
