@@ -374,10 +374,10 @@ test('passes the surface of a frame to the Sculpt lab, and is restored on the wa
   await app.page.click('[data-action=sculpt]');
   await expect.poll(() => app.page.title()).toBe('Vesicle: Sculpt');
   await expect.poll(state).toMatch(/running|done/);
-  expect(await text('.facts')).toContain('ventricle (frame 12)');
+  await expect.poll(() => text('.facts')).toContain('ventricle (frame 12)');
   await app.page.click('[data-lab=track]');
   await expect.poll(() => app.page.title()).toBe('Vesicle: Track');
-  expect(await hash()).toBe('#track?example=ventricle&binning=2');
+  await expect.poll(hash).toBe('#track?example=ventricle&binning=2');
   await tracked(12);
 });
 
