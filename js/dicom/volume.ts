@@ -148,8 +148,8 @@ const FREE_BYTES = 2 ** 29;
 const BYTES_PER_BYTE = 5000;
 
 /**
- * Returns an array of voxels; throws `bad-file` if frames lack bytes, `too-large` if there is no memory for it, or its files
- * cannot hold so many.
+ * Returns an array of voxels; throws `bad-file` if frames lack bytes, `too-large` if there is no memory for it, or it is too
+ * large for its files.
  */
 export function allocated(
   Kind: new (length: number) => VoxelArray,

@@ -337,12 +337,24 @@ impl MultiresolutionModel {
             Detailed { mesh, points, unmatched_vertices: 0, held_vertices: self.detailed.held_vertices };
     }
 
-    /// Sets the target ellipsoids of a surface that holds itself: those that are new leave it as it is, and it returns
+    /// Sets the target ellipsoids of a surface that holds itself: those that are new leave it unchanged, and it returns
     /// where one is removed.
     ///
     /// # Errors
     /// [`MeshError`] if memory does not suffice; nothing has changed then.
     pub(super) fn set_handles(&mut self, given: &[ControlEllipsoid]) -> Result<(), MeshError> {
+        if self.held.as_ref().is_some_and(|held| held.handles.len() != given.len()) {
+            self.change_handles(given)?;
+        }
+        if let Some(held) = &mut self.held {
+            held.is_unsettled = true;
+        }
+        self.ellipsoids.set_poses(given);
+        Ok(())
+    }
+
+    /// Adds or removes handles, so that there is one for each of `given`. On an error nothing changes.
+    fn change_handles(&mut self, given: &[ControlEllipsoid]) -> Result<(), MeshError> {
         let Some(mut held) = self.held.clone() else { return Ok(()) };
         let mut now = Placed {
             mesh: self.surface.clone(),
@@ -353,8 +365,6 @@ impl MultiresolutionModel {
         for added in &given[held.handles.len()..] {
             held.add(Ellipsoid::new(added), &mut now)?;
         }
-        held.is_unsettled = true;
-        self.ellipsoids.set_poses(given);
         self.put_placed(now, held);
         Ok(())
     }

@@ -88,8 +88,7 @@ export class Sessions {
     if (source && states.canChange) await states.enqueue(() => this.#save(source, included));
   }
 
-  // biome-ignore lint/suspicious/noExplicitAny: sessions do not look into links, data and models
-  async #save(source: Source<any, any, any>, included: boolean): Promise<void> {
+  async #save(source: NonNullable<SessionLab['opening']['source']>, included: boolean): Promise<void> {
     const { id: lab, opening, ui, states, address, content } = this.#lab;
     try {
       ui.status.say(text('sessions.saving'));

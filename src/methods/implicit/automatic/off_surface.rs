@@ -29,7 +29,7 @@ const CLEARANCE: f32 = 0.8;
 const LEAST_DIFFERENCE: f32 = 0.3;
 /// Number of points where a pair is tried in a slice.
 const SLICE: usize = 60;
-/// Share of the pairs that were tried below which there is a warning if so many have an end on one side.
+/// There is a warning if less than this share of the pairs that were tried have an end on one of the sides.
 const FEW: f64 = 0.15;
 /// Difference of the winding number from ½ at a position above which normals are inconsistent, and the share of such positions
 /// above which there is a warning. Of 36 clouds of 12 shapes it was .11 at most where no wall or branch was as thin as the
