@@ -76,7 +76,7 @@ export interface MultiresOptions {
   ellipsoids?: ControlEllipsoid[];
   /**
    * The support of the surface. `'membrane'` (default): a membrane over the ellipsoids, as in the paper. `'surface'`:
-   * `detail` holds itself; it stays exactly as given, whatever closed surface it is, except where ellipsoids are moved,
+   * `detail` holds itself; it stays exactly as given, whatever closed surface without self-intersections it is, except where ellipsoids are moved,
    * turned or stretched. What one does fades with the distance along the surface, and leaves more than half of its area as
    * it is. No `base` is needed. An ellipsoid stops where the surface would fold up, and becomes its own target there.
    */
@@ -125,7 +125,7 @@ export class MultiresolutionModel implements Stepper {
    * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: no ellipsoid, none that touches the
    *   base, axes that are not orthogonal or have no length, `edgeMax` not more than twice `edgeMin`, a detail that no
    *   base can be made from; `not-closed` for a detail or base that is open or not manifold; `self-intersecting` for a
-   *   base with self-intersections; `too-large` for edges so short that the surface would have more than 200,000
+   *   base, or a detail that is to hold itself, with self-intersections; `too-large` for edges so short that the surface would have more than 200,000
    *   vertices.
    */
   constructor(given: MultiresOptions) {

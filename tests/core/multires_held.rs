@@ -3,7 +3,7 @@
 use super::common::skins::{assert_sound, ball, turned};
 use super::common::{Named, Random, assert_at_least, seeds};
 use vesicle::math::{DVec3, Vec2, Vec3};
-use vesicle::mesh::{Mesh, TriangleMesh, measure, shapes};
+use vesicle::mesh::{Mesh, MeshError, TriangleMesh, measure, shapes};
 use vesicle::methods::MethodError;
 use vesicle::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, Support,
@@ -255,6 +255,13 @@ fn what_cannot_hold_itself_is_refused() {
         ..Default::default()
     });
     assert!(matches!(open, Err(MethodError::Mesh(_))));
+    let crossing = shapes::joined(&[bumpy(Vec3::ZERO, 0.3), bumpy(Vec3::X * 0.7, 0.3)]);
+    let crossing = MultiresolutionModel::new(MultiresOptions {
+        detail: Some(crossing),
+        support: surface,
+        ..Default::default()
+    });
+    assert!(matches!(crossing, Err(MethodError::Mesh(MeshError::SelfIntersecting { .. }))));
     let far = vec![ball(f64::NAN, 0.0, 0.0, 1.0)];
     let far =
         refusal(MultiresOptions { detail: mesh(), ellipsoids: far, support: surface, ..Default::default() });
