@@ -69,16 +69,18 @@ export interface MultiresOptions {
    */
   base?: Mesh;
   /**
-   * Initial control ellipsoids: at least one, of which one has to touch the base. With `support: 'surface'` they leave the
-   * surface unchanged where they are; if there are none, balls inside it are proposed, see
-   * {@link MultiresolutionModel.ellipsoids}.
+   * Initial control ellipsoids. With `support: 'surface'` they leave the surface unchanged where they are; if there are none,
+   * balls inside it are proposed, see {@link MultiresolutionModel.ellipsoids}. With `'membrane'` there must be at least one,
+   * of which one has to touch the base.
    */
   ellipsoids?: ControlEllipsoid[];
   /**
-   * The support of the surface. `'membrane'` (default): a membrane over the ellipsoids, as in the paper. `'surface'`:
-   * `detail` holds itself; it stays exactly as given, whatever closed surface without self-intersections it is, except where ellipsoids are moved,
-   * turned or stretched. What one does fades with the distance along the surface, and leaves more than half of its area as
-   * it is. No `base` is needed. An ellipsoid stops where the surface would fold up, and becomes its own target there.
+   * The support of the surface. `'surface'`, the default for a `detail` without `base`: `detail` holds itself; whatever
+   * closed surface it is, it stays exactly as given, except where ellipsoids are moved, turned or stretched. What one does
+   * fades with the distance along the surface, and leaves more than half of its area as it is. An ellipsoid stops where the
+   * surface would fold up, and becomes its own target there (warning `handle-stopped`). Components that intersect as given
+   * may go on to (warning `self-intersecting`). Of the parameters, only `edgeMin` and `edgeMax` have an effect.
+   * `'membrane'`, the default otherwise: a membrane over the ellipsoids, as in the paper.
    */
   support?: 'membrane' | 'surface';
   /** Initial parameters: any subset; the others have their defaults. */
@@ -125,12 +127,13 @@ export class MultiresolutionModel implements Stepper {
    * @throws {@link VesicleError} `invalid-argument` naming the option or parameter: no ellipsoid, none that touches the
    *   base, axes that are not orthogonal or have no length, `edgeMax` not more than twice `edgeMin`, a detail that no
    *   base can be made from; `not-closed` for a detail or base that is open or not manifold; `self-intersecting` for a
-   *   base, or a detail that is to hold itself, with self-intersections; `too-large` for edges so short that the surface would have more than 200,000
+   *   base with self-intersections; `too-large` for edges so short that the surface would have more than 200,000
    *   vertices.
    */
   constructor(given: MultiresOptions) {
     const known = checkProperties('options', given, OPTIONS) as MultiresOptions;
-    const holdsItself = choice('support', known.support ?? 'membrane', SUPPORTS) === 'surface';
+    const usual = known.detail && !known.base ? 'surface' : 'membrane';
+    const holdsItself = choice('support', known.support ?? usual, SUPPORTS) === 'surface';
     const ellipsoids = known.ellipsoids ?? (holdsItself ? [] : known.ellipsoids);
     const packed = packedEllipsoids(ellipsoids as readonly ControlEllipsoid[]);
     const params = shallowCopy('params', known.params ?? {});
@@ -299,8 +302,8 @@ export class MultiresolutionModel implements Stepper {
   /**
    * Restores a saved state, bit for bit.
    *
-   * @throws {@link VesicleError} `bad-file` for bytes that are not a saved state of a model made of the same meshes;
-   *   the model then stays unchanged; `invalid-argument` while a run is in progress.
+   * @throws {@link VesicleError} `bad-file` for bytes that are not a saved state of a model made of the same meshes, with the
+   *   same `support`; the model then stays unchanged; `invalid-argument` while a run is in progress.
    */
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);

@@ -14,6 +14,10 @@ export type WarningCode =
   | 'handles'
   /** An image without a boundary at much of the surface. */
   | 'no-boundary'
+  /** An ellipsoid that stopped before its target, since the surface around it would have folded up. */
+  | 'handle-stopped'
+  /** A surface that intersects itself as given, and goes on to. */
+  | 'self-intersecting'
   /** A volume that differs too much from those of the frames beside it. */
   | 'volume-jump'
   /** A label so thin that the volume of its surface is not that of its voxels. */

@@ -11,6 +11,7 @@ const CODES: Record<WarningCode, true> = {
   'uneven-brightness': true,
   'small-object': true,
   ...{ 'touches-box': true, handles: true, 'no-boundary': true, 'volume-jump': true },
+  ...{ 'handle-stopped': true, 'self-intersecting': true },
   'thin-label': true,
   'thin-parts': true,
   ...{ precision: true, recentred: true, anisotropic: true, reader: true },

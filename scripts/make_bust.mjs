@@ -56,7 +56,7 @@ async function write(name, mesh) {
 await script(async () => {
   await init();
   const bust = Mesh.parse(new Uint8Array(await readFile(process.argv[2])));
-  const model = new MultiresolutionModel({ detail: bust, ellipsoids: ELLIPSOIDS });
+  const model = new MultiresolutionModel({ detail: bust, ellipsoids: ELLIPSOIDS, support: 'membrane' });
   await write('nefertiti.ply', bust);
   await write('nefertiti-base.ply', model.baseMesh);
 });

@@ -1,5 +1,5 @@
 // Runs the deformable model at its default settings on every volume of a folder: `npm run real -- FOLDER [--levels N]
-// [--pipeline]`; by default on the example volumes. Prints a row for each volume and iso value and, with --pipeline,
+// [--pipeline]`, or on every mesh the multiresolution model, with `--meshes`; by default on the example volumes. Prints a row for each volume and iso value and, with --pipeline,
 // the figures of flying edges and isotropic remeshing below it. Ends with 1 if a surface intersects itself, or if
 // recall or precision is below 99 %.
 import { readdir, readFile } from 'node:fs/promises';
@@ -8,6 +8,7 @@ import { parseArgs } from 'node:util';
 import { filesBeside } from './beside.mjs';
 import { build } from './build.mjs';
 import { pipelineLine, pipelineOf } from './pipeline.mjs';
+import { reportMeshes } from './real-meshes.mjs';
 import { at, say, script, startedAs } from './shell.mjs';
 
 const VOLUMES = /\.(nii|nii\.gz|nrrd|nhdr|mha|mhd)$/;
@@ -180,9 +181,17 @@ if (startedAs(import.meta.url)) {
     await library.default();
     const { values, positionals } = parseArgs({
       allowPositionals: true,
-      options: { levels: { type: 'string', default: '0' }, pipeline: { type: 'boolean', default: false } },
+      options: {
+        levels: { type: 'string', default: '0' },
+        pipeline: { type: 'boolean', default: false },
+        meshes: { type: 'boolean', default: false },
+      },
     });
     const [folder = at('www/public/data')] = positionals;
+    if (values.meshes) {
+      if (!(await reportMeshes(library, folder, line))) process.exitCode = 1;
+      return;
+    }
     process.stdout.write(
       line(
         '',

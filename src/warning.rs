@@ -79,6 +79,10 @@ codes! {
     Handles = "handles",
     /// The image shows no boundary at much of the surface.
     NoBoundary = "no-boundary",
+    /// A handle stopped before its target, since the surface around it would have folded up.
+    HandleStopped = "handle-stopped",
+    /// The given surface intersects itself, and goes on to.
+    SelfIntersecting = "self-intersecting",
     /// The volume in this frame differs too much from those of the frames beside it.
     VolumeJump = "volume-jump",
     /// A label is so thin that the volume of its surface is not that of its voxels.

@@ -26,7 +26,7 @@ const ATTRIBUTES = ['src', 'method', 'start', 'levels', 'params', 'ellipsoids'];
  * The element `<vesicle-lab>`: loads `src`, runs a method on it, and shows the surface while it evolves.
  *
  * Attributes: `src`, the file; `method`, `deformable` (a volume, the default), `implicit` (points), `tracking` (a
- * volume with frames) or `multires` (a mesh, with `ellipsoids` as JSON); `params` of the method as JSON; `levels` of
+ * volume with frames) or `multires` (a mesh, with `ellipsoids` as JSON for a membrane over them); `params` of the method as JSON; `levels` of
  * the pyramid and `start`, `contour` (the default) or `enclosing`, of the deformable model; `paused`, not to start
  * automatically. Changing an attribute other than `paused` restarts the method. Events: `vesicle-step` after one step
  * or a few, with a `StepReport` as `detail`, `vesicle-done`, `vesicle-error` with the error, `vesicle-warnings` when there

@@ -50,7 +50,9 @@ export const MODELS = {
   tracking: ({ bytes, params }: Settings): Promise<ModelWithView> =>
     ofVolume(bytes, (volume) => SurfaceTracker.create({ volume, params })),
   multires: async ({ bytes, ellipsoids, params }: Settings): Promise<ModelWithView> => {
-    const make = (detail: Mesh) => MultiresolutionModel.create({ detail, ellipsoids, params });
+    // Ellipsoids that do not move show something with a membrane alone.
+    const support = ellipsoids.length > 0 ? 'membrane' : 'surface';
+    const make = (detail: Mesh) => MultiresolutionModel.create({ detail, ellipsoids, support, params });
     return { model: await withResource(await Mesh.parse(bytes), make), from: FRONT };
   },
 };

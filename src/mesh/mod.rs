@@ -58,6 +58,7 @@ pub use origin::{WorldPositions, grid_origin, world_origin};
 pub use patch::{Patch, PatchCorner};
 pub use report::{MeshReport, report};
 pub use ring::Ring;
+pub(crate) use self_intersections::intersecting_parts;
 pub use self_intersections::{Facet, count_self_intersections, facets_intersect, intersecting_pairs};
 pub use surgery::{Cut, TubeRims};
 pub use texture::{ImageKind, Texture};

@@ -6,6 +6,7 @@ use crate::math::predicates::{
     collinear, triangles_intersect, triangles_intersect_sharing_vertex, triangles_overlap_sharing_edge,
 };
 use crate::math::{Bounds, BoxTree, Vec3};
+use std::collections::BTreeSet;
 
 /// Returns the pairs of triangles that intersect beyond their common corners and edges, each with the lower index
 /// first, sorted.
@@ -37,6 +38,22 @@ pub fn count_self_intersections(mesh: &TriangleMesh) -> usize {
         true
     });
     count
+}
+
+/// Returns which parts of a mesh intersect each other, or themselves: pairs of the numbers in `part_of`, which has that of
+/// each triangle, the lower one first. `None` where so many triangles lie on each other that time would be quadratic.
+pub(crate) fn intersecting_parts(mesh: &TriangleMesh, part_of: &[u32]) -> Option<BTreeSet<[u32; 2]>> {
+    let most = MOST_TESTED[0].max(MOST_TESTED[1].saturating_mul(mesh.triangles.len()));
+    let (mut pairs, mut tested) = (BTreeSet::new(), 0);
+    for_each_tested_pair(mesh, |s, t, intersect| {
+        tested += 1;
+        if intersect {
+            let [one, other] = [s, t].map(|triangle| part_of[triangle as usize]);
+            pairs.insert([one.min(other), one.max(other)]);
+        }
+        tested < most
+    });
+    (tested < most).then_some(pairs)
 }
 
 /// Number of self-intersections after which [`count_in_time`] stops.

@@ -31,7 +31,7 @@ mod volume_balance;
 pub use changes::Changes;
 pub use clustering::clustered;
 pub use decimate::{decimate, decimate_within};
-pub use embedding::Embedding;
+pub use embedding::{Embedding, PairsOfParts};
 pub use isotropic::remesh;
 pub use plane_cut::{Plane, cut_by_plane};
 pub use resolve::{ContactPolicy, Pending, Resolver, TopologyGuide, Unguided};

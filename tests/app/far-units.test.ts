@@ -206,7 +206,10 @@ describe('coordinates as text', () => {
     expect(off(volume?.sphere?.center ?? [], clicked)).toBeLessThan(1e-5);
     expect(volume?.attractors).toEqual(settings.attractors);
     const pose = [moved(ball(0, 0, 0, 3), clicked)];
-    const scene = { example: undefined, file: 'house.obj', params: {}, usual: {}, film: undefined };
+    const scene = {
+      ...{ example: undefined, file: 'house.obj', params: {}, usual: {}, film: undefined },
+      ...{ support: 'membrane' as const, start: [] },
+    };
     const hash = sculptLink.toHash(sculptLink.linkOf({ ...scene, pose, color: 'plain', layout: 'result' }));
     expect(off(sculptLink.fromHash(hash)?.pose?.[0]?.center ?? [], clicked)).toBeLessThan(1e-3);
   });

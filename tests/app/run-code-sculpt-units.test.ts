@@ -4,7 +4,15 @@ import init from '../../pkg/index.js';
 import { uniform } from '../../www/src/random';
 import { ball, moved, turned, withLengths } from '../../www/src/sculpt/ellipsoids';
 import type { Film } from '../../www/src/sculpt/film';
-import type { FrameEvent, Pose, PoseMessage, Requests, SavedPose, SceneSource } from '../../www/src/sculpt/protocol';
+import type {
+  FrameEvent,
+  Pose,
+  PoseMessage,
+  Requests,
+  SavedPose,
+  SceneSource,
+  Support,
+} from '../../www/src/sculpt/protocol';
 import { globeAsObj } from '../../www/src/sculpt/shapes';
 import { LONG } from './long';
 import { pickFrom, programsIn } from './run-code';
@@ -52,14 +60,20 @@ async function pose(target: Pose, dragging: boolean): Promise<void> {
 }
 
 /** Opens a scene, acts at random, and writes code of it; returns the surface. */
-async function interactiveRun(seed: number, source: SceneSource, params: object = PARAMS): Promise<Uint8Array> {
+async function interactiveRun(
+  seed: number,
+  source: SceneSource,
+  params: object = PARAMS,
+  support: Support = 'membrane',
+): Promise<Uint8Array> {
+  const held = { pose: undefined, support };
   const random = uniform(seed);
   const pick = pickFrom(random);
   const off = () => 0.3 * (random() - 0.5);
   const saves: SavedPose[] = [];
   const changed = (one: Pose[number]) => turned(moved(one, [off(), off(), off()]), [0, 0, 1], off());
   const target = () => (last?.pose ?? START).map((one) => (random() < 0.5 ? one : changed(one)));
-  await worker.request('open', { source, setup: { start: START, params: { ...params }, pose: undefined } });
+  await worker.request('open', { source, setup: { start: START, params: { ...params }, ...held } });
   await worker.request('show', { layout: 'result', quantity: undefined, textured: false });
   const can: (() => Promise<unknown>)[] = [
     () => pose(target(), false),
@@ -82,7 +96,7 @@ async function interactiveRun(seed: number, source: SceneSource, params: object 
       await worker.request('film', { film: FILM, frame: 0 });
       await worker.request('play', undefined);
     },
-    () => worker.request('rebuild', { start: undefined, params: { ...params }, pose: undefined }),
+    () => worker.request('rebuild', { start: undefined, params: { ...params }, ...held }),
     async () => {
       await worker.request('film', { film: FILM, frame: 0 });
       await worker.request('record', { frameSeconds: 0.1 });
@@ -121,8 +135,23 @@ test('the code of random gestures gives the same surfaces, of a mesh in a file o
   ]);
 });
 
+test('the code of random gestures gives the same surfaces, of a surface that holds itself', LONG, async () => {
+  const source = (): SceneSource => ({ detail: { shape: 'ball' } });
+  const made: Uint8Array[] = [];
+  for (const seed of [7, 8, 9])
+    made.push(await interactiveRun(seed, source(), { edgeMin: 0.1, edgeMax: 0.3 }, 'surface'));
+  await programs.expectSame(made, []);
+  // Built anew with the other support, and back.
+  const setup = { start: undefined, params: PARAMS, pose: undefined };
+  const membrane = await worker.request('rebuild', { ...setup, support: 'membrane' });
+  const surface = await worker.request('rebuild', { ...setup, support: 'surface' });
+  expect(surface.start).not.toEqual(membrane.start);
+  await programs.add(9, await worker.request('code', { stem: 'mesh', edits: [] }));
+  await programs.expectSame([await worker.request('export', { format: 'ply' })], []);
+});
+
 test('a session keeps the log of the present model', async () => {
-  const setup = { start: START, params: PARAMS, pose: undefined };
+  const setup = { start: START, params: PARAMS, pose: undefined, support: 'membrane' } as const;
   await worker.request('open', { source: {}, setup });
   await worker.request('setParams', { edgeMin: 0.1 });
   await pose([moved(START[0] as Pose[number], [0.1, 0, 0.2]), ...START.slice(1)], false);

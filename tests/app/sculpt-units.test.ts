@@ -98,7 +98,7 @@ describe('fitted ellipsoids', () => {
       expect(max[k]).toBeLessThan(k === 1 ? 4.3 : 1.2);
     }
     expect(max[1] - min[1]).toBeGreaterThan(6);
-    const model = new MultiresolutionModel({ detail: rod, ellipsoids: row });
+    const model = new MultiresolutionModel({ detail: rod, ellipsoids: row, support: 'membrane' });
     expect(model.step(1).components).toBe(1);
     for (const one of [model, rod, round]) one.free();
   });
@@ -118,7 +118,10 @@ describe('fitted ellipsoids', () => {
 });
 
 describe('links', () => {
-  const settings = { file: '', usual: { smoothing: 10 }, params: { smoothing: 10 }, color: 'plain', layout: 'result' };
+  const settings = {
+    ...{ file: '', usual: { smoothing: 10 }, params: { smoothing: 10 }, color: 'plain', layout: 'result' },
+    ...{ support: 'membrane' as const, start: [] },
+  };
   const [bust] = SCENES;
 
   test('of the first scene in its initial state have no parameters', () => {
@@ -134,6 +137,16 @@ describe('links', () => {
     expect(linked?.pose?.length).toBe(2);
     expect(linked?.pose?.[0]?.axes[0][0]).toBeCloseTo(3 * Math.cos(0.3), 3);
     expect(linked && filmOf(linked, bust.film)).toEqual(film);
+  });
+
+  test('of files say what supports the surface, and which ellipsoids leave it as it is', () => {
+    const file = { ...settings, file: 'cow.obj', example: undefined, film: undefined };
+    expect(toHash(linkOf({ ...file, pose: undefined }))).toBe('#sculpt?file=cow.obj&support=membrane');
+    const surface = { ...file, support: 'surface' as const, start: [LONG] };
+    expect(toHash(linkOf({ ...surface, pose: undefined }))).toBe('#sculpt?file=cow.obj&support=surface');
+    const linked = fromHash(toHash(linkOf({ ...surface, pose: [moved(LONG, [1, 0, 0])] })));
+    expect(linked).toMatchObject({ support: 'surface', rest: [LONG], pose: [moved(LONG, [1, 0, 0])] });
+    expect(fromHash('#sculpt?file=cow.obj&support=pillar')).toEqual({ params: {}, file: 'cow.obj' });
   });
 
   test('with invalid parts are read as far as possible', () => {

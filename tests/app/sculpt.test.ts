@@ -42,6 +42,24 @@ const text = (selector: string) => app.page.locator(selector).first().textConten
 const hash = () => app.page.evaluate(() => location.hash);
 const view = () => app.page.locator('.scene > canvas');
 
+type Arrays = ReturnType<Mesh['arrays']>;
+
+/** The meshes that can be shown. */
+const layouts = () =>
+  app.page
+    .locator('[data-view=layout] option:not([hidden])')
+    .evaluateAll((all) => all.map((one) => (one as HTMLOptionElement).value));
+
+/** Returns a thin plate with a wave in it, over which no smooth base is a graph. */
+function slab(): Mesh {
+  const { positions, indices } = Mesh.icosphere([0, 0, 0], 1, 0.15).arrays();
+  for (let at = 0; at < positions.length; at += 3) {
+    const x = positions[at] ?? 0;
+    positions[at + 2] = 0.06 * (positions[at + 2] ?? 0) + 0.3 * Math.sin(4 * x);
+  }
+  return Mesh.fromArrays(positions, indices);
+}
+
 /** A surface with few triangles, so that a page with software rendering is fast. */
 const SMALL = '#sculpt?example=globe&p.edgeMin=0.09&p.edgeMax=0.2';
 
@@ -340,19 +358,91 @@ describe('an example', LONG, () => {
 });
 
 describe('a file', () => {
-  test('opens with fitted ellipsoids', async () => {
+  test('rests as it is until an ellipsoid moves, and returns', async () => {
+    const mesh = slab();
+    await drop(app.page, [{ name: 'slab.ply', bytes: mesh.toBytes('ply') }]);
+    await expect.poll(() => text('.facts dd')).toBe('slab.ply');
+    await reach(app.page, 'done');
+    const { volume, area } = mesh.info();
+    const atRest = await measured();
+    expect(atRest).toMatchObject({ components: 1, closed: true, crossings: 0, triangles: mesh.triangleCount });
+    for (const [found, given] of [
+      [atRest.volume, volume],
+      [atRest.area, area],
+    ])
+      expect(Number(found) / Number(given)).toBeCloseTo(1, 6);
+    expect(await hash()).toBe('#sculpt?file=slab.ply&support=surface');
+    // What has no effect is not shown.
+    await app.page.evaluate(() =>
+      document.querySelectorAll('details').forEach((one) => {
+        one.open = true;
+      }),
+    );
+    expect(await app.page.isVisible('[data-param=edgeMax]')).toBe(true);
+    expect(await app.page.isVisible('[data-param=levels]')).toBe(false);
+    expect(await layouts()).toEqual(['result']);
+    await view().press('1');
+    await view().press('ArrowUp');
+    await expect.poll(async () => (await measured()).volume).not.toBe(atRest.volume);
+    await reach(app.page, 'done');
+    expect(await hash()).toMatch(/support=surface&rest=.*&pose=/);
+    await view().press('Control+z');
+    await expect.poll(async () => (await measured()).volume).toBe(atRest.volume);
+    mesh.free();
+  });
+
+  test('stays as it is where no base can be made for a membrane', LONG, async () => {
+    const before = await measured();
+    await app.page.selectOption('[data-support]', 'membrane');
+    await app.page.waitForSelector('[data-state=error]');
+    expect(await app.page.inputValue('[data-support]')).toBe('surface');
+    await app.page.click('.banner button');
+    expect((await measured()).volume).toBe(before.volume);
+    expect(await hash()).toContain('support=surface');
+  });
+
+  test('can be on a membrane, as in the paper', async () => {
     const mesh = Mesh.icosphere([3, 0, 0], 2, 0.5);
     await drop(app.page, [{ name: 'ball.ply', bytes: mesh.toBytes('ply') }]);
+    mesh.free();
     await expect.poll(() => text('.facts dd')).toBe('ball.ply');
     await reach(app.page, 'done');
-    expect(await measured()).toMatchObject({ components: 1, closed: true, crossings: 0 });
-    expect(await hash()).toContain('file=ball.ply');
-    mesh.free();
+    const before = await measured();
+    await app.page.selectOption('[data-support]', 'membrane');
+    await expect.poll(hash).toBe('#sculpt?file=ball.ply&support=membrane');
+    await reach(app.page, 'paused');
+    expect(await app.page.isVisible('[data-param=levels]')).toBe(true);
+    expect((await layouts()).length).toBeGreaterThan(3);
+    await app.page.selectOption('[data-support]', 'surface');
+    await expect.poll(hash).toBe('#sculpt?file=ball.ply&support=surface');
+    await reach(app.page, 'paused');
+    await view().press('s');
+    await expect.poll(async () => (await measured()).volume).toBe(before.volume);
+    await openAt(SMALL, 'done');
+    expect(await app.page.isVisible('[data-support]')).toBe(false);
+  });
+
+  test('that intersects itself opens with a warning', async () => {
+    const [one, other] = [0, 1.5].map((x) => Mesh.icosphere([x, 0, 0], 1, 0.3).arrays()) as [Arrays, Arrays];
+    const more = other.indices.map((v) => v + one.positions.length / 3);
+    const both = Mesh.fromArrays(
+      Float32Array.from([...one.positions, ...other.positions]),
+      Uint32Array.from([...one.indices, ...more]),
+    );
+    await drop(app.page, [{ name: 'two.ply', bytes: both.toBytes('ply') }]);
+    await expect.poll(() => text('.facts dd')).toBe('two.ply');
+    await reach(app.page, 'done');
+    expect(await measured()).toMatchObject({ components: 2, triangles: both.triangleCount });
+    expect(await text('.warnings')).toContain('intersects itself as given');
+    both.free();
   });
 
   test('that takes long can be cancelled, and the previous data are restored', LONG, async () => {
     const bytes = new Uint8Array(await readFile(at('www/public/data/nefertiti.ply')));
     await openAt(SMALL, 'done');
+    await app.page.evaluate(() => {
+      location.hash = '#sculpt?file=bust.ply&support=membrane';
+    });
     await drop(app.page, [{ name: 'bust.ply', bytes }]);
     await expect.poll(() => text('.status')).toMatch(/^Computing the base of bust\.ply/);
     await app.page.click('[data-action=cancel]');

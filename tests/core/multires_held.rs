@@ -3,12 +3,13 @@
 use super::common::skins::{assert_sound, ball, turned};
 use super::common::{Named, Random, assert_at_least, seeds};
 use vesicle::math::{DVec3, Vec2, Vec3};
-use vesicle::mesh::{Mesh, MeshError, TriangleMesh, measure, shapes};
-use vesicle::methods::MethodError;
+use vesicle::mesh::{Mesh, TriangleMesh, intersecting_pairs, measure, shapes};
+use vesicle::methods::{MethodError, StepReport};
 use vesicle::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, Support,
 };
 use vesicle::spatial::{SurfaceWalker, surface_distance};
+use vesicle::warning::WarningCode;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -255,17 +256,61 @@ fn what_cannot_hold_itself_is_refused() {
         ..Default::default()
     });
     assert!(matches!(open, Err(MethodError::Mesh(_))));
-    let crossing = shapes::joined(&[bumpy(Vec3::ZERO, 0.3), bumpy(Vec3::X * 0.7, 0.3)]);
-    let crossing = MultiresolutionModel::new(MultiresOptions {
-        detail: Some(crossing),
-        support: surface,
-        ..Default::default()
-    });
-    assert!(matches!(crossing, Err(MethodError::Mesh(MeshError::SelfIntersecting { .. }))));
     let far = vec![ball(f64::NAN, 0.0, 0.0, 1.0)];
     let far =
         refusal(MultiresOptions { detail: mesh(), ellipsoids: far, support: surface, ..Default::default() });
     assert!(far.starts_with("ellipsoids"), "{far}");
+}
+
+/// Two balls intersect as given, a third one does not: it stays apart from them.
+#[test]
+fn parts_that_intersect_as_given_go_on_to_with_a_warning() {
+    let parts = [Vec3::ZERO, Vec3::X * 1.5, Vec3::X * 3.9].map(|centre| bumpy(centre, 0.3));
+    let start = vec![ball(0.0, 0.0, 0.0, 0.6), ball(1.5, 0.0, 0.0, 0.6), ball(3.9, 0.0, 0.0, 0.6)];
+    let options = MultiresOptions {
+        detail: Some(shapes::joined(&parts)),
+        ellipsoids: start.clone(),
+        support: Support::Surface,
+        ..Default::default()
+    };
+    let mut model = MultiresolutionModel::new(options).unwrap();
+    let report = settle(&mut model);
+    let codes = |report: &StepReport| report.warnings.iter().map(|w| w.code).collect::<Vec<_>>();
+    assert_eq!(codes(&report), [WarningCode::SelfIntersecting]);
+    // The second through the first: they may.
+    let mut moved = start.clone();
+    moved[1].center[0] = 1.2;
+    model.set_ellipsoids(&moved).unwrap();
+    assert_eq!(codes(&settle(&mut model)), [WarningCode::SelfIntersecting]);
+    assert!((model.ellipsoids()[1].center[0] - 1.2).abs() < 1e-9);
+    // And into the third: it stops in time.
+    moved[1].center[0] = 2.4;
+    model.set_ellipsoids(&moved).unwrap();
+    assert_eq!(codes(&settle(&mut model)), [WarningCode::SelfIntersecting, WarningCode::HandleStopped]);
+    let surface = model.surface();
+    let part = surface.component_of_each_vertex();
+    let third = part[parts[0].positions.len() + parts[1].positions.len()];
+    let is_third = |t: u32| part[surface.triangles[t as usize][0] as usize] == third;
+    let pairs = intersecting_pairs(&surface);
+    assert!(pairs.iter().all(|&[s, t]| is_third(s) == is_third(t)), "the third is intersected");
+    assert_eq!(codes(&back_to(&mut model, &start)), [WarningCode::SelfIntersecting]);
+    assert!(model.surface().positions == shapes::joined(&parts).positions);
+}
+
+/// Steps until the model is done, of a surface that intersects itself.
+fn settle(model: &mut MultiresolutionModel) -> StepReport {
+    for _ in 0..300 {
+        let report = model.step().unwrap();
+        if report.done {
+            return report;
+        }
+    }
+    panic!("the run does not end");
+}
+
+fn back_to(model: &mut MultiresolutionModel, start: &[ControlEllipsoid]) -> StepReport {
+    model.set_ellipsoids(start).unwrap();
+    settle(model)
 }
 
 fn random_pose(random: &mut Random, rest: &[ControlEllipsoid], size: f64) -> Vec<ControlEllipsoid> {

@@ -111,8 +111,9 @@ test('texture coordinates move with the surface', () => {
 test('a surface that holds itself rests as given, and follows the ellipsoids proposed for it', async () => {
   const detail = wavy();
   const given = [...detail.arrays().positions];
-  const { ellipsoids: _, ...options } = { ellipsoids: undefined, detail, support: 'surface' as const };
-  const made = new MultiresolutionModel(options);
+  const options = { detail, support: 'surface' as const };
+  // The default for a detail alone.
+  const made = new MultiresolutionModel({ detail });
   models.push(made);
   expect((await made.run()).done).toBe(true);
   expect([...made.mesh.arrays().positions]).toEqual(given);
@@ -185,7 +186,8 @@ test('invalid arguments are refused by name', async () => {
   expect(message(() => model({ params: { edgeMin: 1, edgeMax: 2 } }))).toContain('edgeMax');
   expect(message(() => model({ params: { levels: 2.5 } }))).toContain('levels');
   expect(message(() => model({ params: wrong({ colour: 1 }) }))).toContain('colour');
-  expect(message(() => model({ detail: wavy(), ellipsoids: [ball(9, 1)] }))).toContain('must touch');
+  const paper = { detail: wavy(), support: 'membrane' } as const;
+  expect(message(() => model({ ...paper, ellipsoids: [ball(9, 1)] }))).toContain('must touch');
   expect(code(() => model({ params: { edgeMin: 1e-5, edgeMax: 3e-5 } }))).toBe('too-large');
   const open = Mesh.icosphere([0, 0, 0], 1, 0.5).arrays();
   const hole = Mesh.fromArrays(open.positions, open.indices.slice(3));

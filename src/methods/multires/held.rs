@@ -5,6 +5,7 @@
 //! handles do, they can undo.
 
 use super::correspondence::{BasePoint, Correspondence, UNSET};
+use super::crossings::Crossings;
 use super::detail::{Band, Detailed};
 use super::ellipsoid::Ellipsoid;
 use super::frame::Lap;
@@ -19,6 +20,7 @@ use crate::mesh::{EditError, Mesh, MeshError, TriangleMesh, VertexId, geodesic_d
 use crate::methods::Times;
 use crate::remesh::{Changes, Embedding};
 use crate::spatial::SurfaceWalker;
+use crate::warning::{Warning, WarningCode};
 use serde::{Deserialize, Serialize};
 
 /// Largest distance along the surface at which the effect of a handle ends, as a share of the diagonal of the bounding box.
@@ -76,6 +78,9 @@ pub(super) struct Held {
     /// Whether the surface may not be where the handles move it: edges were halved in the last frame, or something else
     /// has changed.
     pub is_unsettled: bool,
+    /// Whether handles stopped before the targets that were set last.
+    has_stopped: bool,
+    crossings: Crossings,
 }
 
 /// Handles as they are saved.
@@ -84,6 +89,7 @@ pub(super) struct SavedHandles {
     handles: Vec<Handle>,
     distances: Vec<f32>,
     is_unsettled: bool,
+    has_stopped: bool,
 }
 
 impl Held {
@@ -115,6 +121,8 @@ impl Held {
             start,
             distances: Vec::new(),
             is_unsettled: false,
+            has_stopped: false,
+            crossings: Crossings::of(walker.mesh()),
         };
         for ellipsoid in ellipsoids {
             held.add(Ellipsoid::new(ellipsoid), &mut now)?;
@@ -126,6 +134,16 @@ impl Held {
     /// Returns the surface that the handles leave as it is, with its long edges halved.
     pub fn start(&self) -> &Placed {
         &self.start
+    }
+
+    /// Returns what is to be known about the surface.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let stopped = self.has_stopped.then(|| {
+            let what = "An ellipsoid stopped before its target: the surface around it would have folded up. Move it by less, \
+                        use a smaller one, or move others along with it.";
+            Warning::new(WarningCode::HandleStopped, what)
+        });
+        self.crossings.warning().into_iter().chain(stopped).collect()
     }
 
     pub fn is_at_rest(&self) -> bool {
@@ -248,6 +266,7 @@ impl Held {
             (0..now.mesh.slots()).map(|i| self.target(now, VertexId::from_index(i))).collect();
         let mut displacements = displacements_to(&now.mesh, &targets);
         guard.sync_with_edge(&now.mesh, self.edge);
+        self.crossings.exempt_from(guard, &now.points);
         let most = (MOST_BLOCKED * now.mesh.vertex_count() as f64) as usize;
         let moving: Vec<VertexId> =
             now.mesh.vertices().filter(|v| displacements[v.index()] != Vec3::ZERO).collect();
@@ -272,12 +291,13 @@ impl Held {
             handles: self.handles.clone(),
             distances: self.distances.clone(),
             is_unsettled: self.is_unsettled,
+            has_stopped: self.has_stopped,
         }
     }
 
     /// Returns a copy with saved handles, and their distances from a surface with `slots`; `None` if they do not fit.
     pub fn restored(&self, saved: SavedHandles, slots: usize) -> Option<Self> {
-        let SavedHandles { handles, distances, is_unsettled } = saved;
+        let SavedHandles { handles, distances, is_unsettled, has_stopped } = saved;
         let (count, before) = (handles.len(), self.start.mesh.slots());
         let is_valid = count > 0
             && handles.iter().all(Handle::is_valid)
@@ -286,7 +306,7 @@ impl Held {
             && distances.iter().all(|&d| d >= 0.0);
         is_valid.then(|| {
             let start = Placed { distances: distances[..before * count].to_vec(), ..self.start.clone() };
-            Self { handles, start, distances, is_unsettled, ..self.clone() }
+            Self { handles, start, distances, is_unsettled, has_stopped, ..self.clone() }
         })
     }
 }
@@ -315,7 +335,7 @@ impl MultiresolutionModel {
         let (splits, moved) = done.unwrap_or_default();
         if done.is_none() {
             self.ellipsoids.stop();
-            held.is_unsettled = false;
+            (held.is_unsettled, held.has_stopped) = (false, true);
         }
         self.residual = moved / self.model_params.target();
         self.put_placed(now, held);
@@ -347,7 +367,7 @@ impl MultiresolutionModel {
             self.change_handles(given)?;
         }
         if let Some(held) = &mut self.held {
-            held.is_unsettled = true;
+            (held.is_unsettled, held.has_stopped) = (true, false);
         }
         self.ellipsoids.set_poses(given);
         Ok(())

@@ -21,6 +21,7 @@
 mod base;
 mod containment;
 mod correspondence;
+mod crossings;
 mod detail;
 mod distortion;
 mod ellipsoid;
@@ -477,7 +478,7 @@ impl MultiresolutionModel {
             euler: mesh.euler() as i32,
             events,
             times,
-            warnings: Vec::new(),
+            warnings: self.held.as_ref().map(Held::warnings).unwrap_or_default(),
         }
     }
 }

@@ -63,7 +63,7 @@ pub(super) fn set_up(
 /// Validates a surface that is to hold itself. Returns it, and the parameters with edge bounds of 0 replaced by defaults.
 ///
 /// # Errors
-/// As [`set_up`]; [`MethodError::Mesh`] if the surface intersects itself.
+/// As [`set_up`].
 pub(super) fn set_up_surface(
     detail: TriangleMesh,
     params: MultiresParams,
@@ -73,7 +73,6 @@ pub(super) fn set_up_surface(
         Mesh::from_triangles(&detail).is_ok_and(|mesh| mesh.vertex_count() == detail.positions.len());
     let detail = if is_closed { detail } else { validate_closed("detail", detail)? };
     check_edges("detail", &detail)?;
-    check_embedded(&detail)?;
     let area = measure(&detail).area;
     let params = params.with_target(edge_for(area, DEFAULT_TRIANGLES));
     params.validate()?;

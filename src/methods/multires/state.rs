@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLMRS\x03";
 /// That of a surface that holds itself, whose handles follow.
-const HELD: Magic = *b"VSCLMRH\x01";
+const HELD: Magic = *b"VSCLMRH\x02";
 
 /// The saved state: everything of a run but the decomposition of its input surfaces.
 #[derive(Serialize, Deserialize)]
@@ -58,13 +58,13 @@ impl MultiresolutionModel {
     /// # Errors
     /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let (state, handles): (State, Option<SavedHandles>) = if self.held.is_some() {
-            let (state, handles) = decode(&HELD, bytes)?;
-            (state, Some(handles))
-        } else {
-            (decode(&MAGIC, bytes)?, None)
-        };
         let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
+        let (state, handles): (State, Option<SavedHandles>) = match self.held {
+            Some(_) if bytes.starts_with(&MAGIC) => return bad("support", "saved with \"membrane\""),
+            None if bytes.starts_with(&HELD) => return bad("support", "saved with \"surface\""),
+            Some(_) => decode(&HELD, bytes).map(|(state, handles)| (state, Some(handles)))?,
+            None => (decode(&MAGIC, bytes)?, None),
+        };
         if state.fingerprint != self.fingerprint() {
             return bad("surfaces", "the state belongs to another detail, base or start");
         }

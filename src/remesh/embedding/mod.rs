@@ -26,6 +26,7 @@ mod patch;
 mod refine;
 mod replace;
 mod separate;
+mod tolerated;
 
 use crate::math::{Bounds, DAffine3, higher, resize, resize_within, triangle};
 use crate::mesh::{EditError, Mesh, MeshError, VertexId};
@@ -35,6 +36,8 @@ use motion_bound::{Checks, MotionBounds};
 use one_ring::longest_edge;
 use output::OutputSpace;
 use smallvec::SmallVec;
+pub use tolerated::PairsOfParts;
+use tolerated::Tolerated;
 
 /// 1/√3, rounded up: the largest distance of a point of a triangle from its nearest corner, relative to the longest
 /// edge of the triangle.
@@ -110,6 +113,8 @@ pub struct Embedding {
     /// The output space (world space in single precision), in which triangles must not intersect either, if it is
     /// watched.
     output: Option<OutputSpace>,
+    /// The parts of the mesh that may intersect in moves.
+    tolerated: Tolerated,
 }
 
 impl Embedding {

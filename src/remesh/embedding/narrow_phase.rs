@@ -55,6 +55,7 @@ impl Embedding {
             }
         }
         dirty.iter().for_each(|v| self.pending[v.index()] = Checks::default());
+        self.tolerated.remove_from(&mut intersecting);
         sort_distinct(&mut intersecting);
         intersecting
     }

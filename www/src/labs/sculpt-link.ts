@@ -3,7 +3,7 @@ import type { ParamValues } from '../protocol';
 import { fromNumbers, lengthsOf, toNumbers } from '../sculpt/ellipsoids';
 import { SCENES, type SculptExample } from '../sculpt/examples';
 import type { Film } from '../sculpt/film';
-import type { Pose } from '../sculpt/protocol';
+import type { Pose, Support } from '../sculpt/protocol';
 import { differing } from './link';
 import { allIn, paramsIn, queryOf, textsIn } from './link-query';
 
@@ -25,6 +25,13 @@ export interface LinkedScene {
   /** Name of the user's file, if one is open; the link does not contain the file itself. */
   file?: string;
   params: ParamValues;
+  /**
+   * What supports the surface of a file; links of versions that knew only the membrane do not say so. Undefined for
+   * examples.
+   */
+  support?: Support;
+  /** The ellipsoids that leave a surface that holds itself as it is, if they have moved. */
+  rest?: Pose;
   /** Target pose of the ellipsoids, if it was set by hand. */
   pose?: Pose;
   names?: string[];
@@ -43,6 +50,9 @@ export interface SceneSettings {
   params: ParamValues;
   /** Parameters that the scene opened with, without changes by a link. */
   usual: ParamValues;
+  support: Support;
+  /** The ellipsoids with which the model was built. */
+  start: Pose;
   pose: Pose | undefined;
   film: Film | undefined;
   color: string;
@@ -53,14 +63,16 @@ export interface SceneSettings {
  * Returns what a link to the lab's present state contains: the settings that differ from those of the example, and the
  * parameters that differ from `usual`; keyframes only if there are at most {@link MOST_KEYS}.
  */
-export function linkOf({ example, file, params, usual, pose, film, color, layout }: SceneSettings): LinkedScene {
+export function linkOf(settings: SceneSettings): LinkedScene {
+  const { example, file, params, usual, support, start, pose, film, color, layout } = settings;
   const own =
     film !== example?.film && film && 'keys' in film && film.keys.length <= MOST_KEYS && film.keys.every(fits);
   const looped = film?.loop !== undefined && film.loop !== (example?.film?.loop ?? false);
   return {
-    ...(!example && { file }),
+    ...(!example && { file, support }),
     ...(example && example !== SCENES[0] && { example: example.id }),
     params: differing(params, usual),
+    ...(support === 'surface' && (own || pose) && fits(start) && { rest: start }),
     ...(pose && fits(pose) && { pose }),
     ...(own && { keys: film.keys, between: film.between }),
     ...(looped && { loop: film.loop }),
@@ -105,11 +117,12 @@ function asPose(text: string): Pose | undefined {
 /** Converts the settings in a link to the hash of an address. */
 export function toHash(linked: LinkedScene): string {
   const query = new URLSearchParams();
-  for (const name of ['example', 'file', 'color', 'layout', 'between', 'loop'] as const) {
+  for (const name of ['example', 'file', 'support', 'color', 'layout', 'between', 'loop'] as const) {
     const value = linked[name];
     if (value !== undefined) query.set(name, String(value));
   }
   for (const [name, value] of Object.entries(linked.params)) query.set(`p.${name}`, String(value));
+  if (linked.rest) query.set('rest', asText(linked.rest));
   if (linked.pose) query.set('pose', asText(linked.pose));
   for (const key of linked.keys ?? []) query.append('key', asText(key));
   const text = query.toString().replaceAll('%2C', ',').replaceAll('%3B', ';');
@@ -130,8 +143,12 @@ export function fromHash(hash: string): LinkedScene | undefined {
   const between = Number(query.get('between') ?? Number.NaN);
   if (Number.isInteger(between) && between > 0) linked.between = between;
   if (query.has('loop')) linked.loop = query.get('loop') === 'true';
-  const pose = asPose(query.get('pose') ?? '');
-  if (pose) linked.pose = pose;
+  const support = query.get('support');
+  if (support === 'surface' || support === 'membrane') linked.support = support;
+  for (const name of ['rest', 'pose'] as const) {
+    const pose = asPose(query.get(name) ?? '');
+    if (pose) linked[name] = pose;
+  }
   const keys = allIn(query, 'key', MOST_KEYS).flatMap((key) => [asPose(key) ?? []].filter(({ length }) => length > 0));
   if (keys.length > 0) linked.keys = keys;
   return linked;

@@ -1,7 +1,7 @@
 import type { SculptClient } from '../sculpt/client';
 import { SCENES, type SculptExample } from '../sculpt/examples';
 import { isSculptPreset, sceneById } from '../sculpt/presets';
-import type { NamedBytes, OpenedScene, SceneSource } from '../sculpt/protocol';
+import type { NamedBytes, OpenedScene, SceneSource, Support } from '../sculpt/protocol';
 import { contentOf } from '../session/recognise';
 import { text } from '../texts';
 import type { LabStates } from './lab-states';
@@ -80,18 +80,30 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
       const { log } = content;
       // The state fits a model of the parameters that its own was built with, not of those in force.
       const params = log?.setup.params ?? content.params;
-      const setup = { start: saved.start, params, pose: undefined };
+      const setup = { start: saved.start, params, pose: undefined, support: saved.support ?? 'membrane' };
       return { ...(await this.#client.request('open', { source: meshes, setup, saved, log })), moments };
     }
-    if (meshes.detail && !meshes.base) this.states.load(text('sculpt.computingBase', { name }));
+    const support = supportOf(meshes, example, linked);
+    if (support === 'membrane' && meshes.detail && !meshes.base)
+      this.states.load(text('sculpt.computingBase', { name }));
     const params = { ...(example?.params ?? OWN_PARAMS), ...linked?.params };
     const [variant] = isSculptPreset(example) ? example.variants : [];
     const usual = linked?.keys ? undefined : (variant?.pose ?? example?.pose);
-    const setup = { start: example?.start, params, pose: linked?.pose ?? usual };
+    const start = example?.start ?? (support === 'surface' ? linked?.rest : undefined);
+    const setup = { start, params, pose: linked?.pose ?? usual, support };
     return this.#client.request('open', { source: meshes, setup });
   }
 
   protected adopt(opened: OpenedPose, source: SculptSource): Promise<void> {
     return this.#onOpened(opened, source);
   }
+}
+
+/**
+ * Returns what supports a surface: itself, if it is the user's own and has no base, unless its link says otherwise. Links
+ * of versions that knew only the membrane say nothing.
+ */
+function supportOf(meshes: SceneSource, example?: SculptExample, linked?: LinkedScene): Support {
+  if (example || meshes.base || !meshes.detail) return 'membrane';
+  return linked ? (linked.support ?? 'membrane') : 'surface';
 }

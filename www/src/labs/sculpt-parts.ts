@@ -2,7 +2,7 @@ import type { Texture } from 'three';
 import type { SculptClient } from '../sculpt/client';
 import type { SculptExample } from '../sculpt/examples';
 import { posesOf, type SculptPreset, type SculptVariant } from '../sculpt/presets';
-import type { MeshTexture, OpenedScene, ParamValues } from '../sculpt/protocol';
+import type { MeshTexture, OpenedScene, ParamValues, Support } from '../sculpt/protocol';
 import type { LabState } from '../state';
 import { text } from '../texts';
 import { h, section } from '../ui/dom';
@@ -14,6 +14,7 @@ import type { History } from '../ui/history';
 import { MeasurePanel } from '../ui/measures';
 import { Plots } from '../ui/plots';
 import { SculptOptionControls } from '../ui/sculpt-options';
+import { SupportControl } from '../ui/support';
 import { pictureOf } from '../view/picture';
 import { SculptureView, type SculptViewOptions } from '../view/sculpture';
 import type { Warning } from '../warnings';
@@ -26,8 +27,12 @@ import { factsOf, sceneData } from './sculpt-page';
 
 const INITIAL_VIEW: SculptViewOptions = { layout: 'result', edges: false, ellipsoids: true, color: 'plain' };
 
+/** Parameters that have an effect on a membrane alone. */
+const OF_MEMBRANES = ['levels', 'refineFactor', 'smoothing', 'distribute', 'supersample', 'energy', 'topology'];
+
 export interface PartEvents extends RunEvents<SculptExample>, EllipsoidEvents, FilmEvents {
   onVariant: (preset: SculptPreset, variant: SculptVariant) => void;
+  onSupport: (support: Support) => void;
   onOptions: (options: SculptViewOptions) => void;
 }
 
@@ -41,6 +46,7 @@ export class SculptParts extends RunParts<SculptExample> {
   readonly options: SculptOptionControls;
   readonly ellipsoids: EllipsoidControls;
   readonly film: FilmControls;
+  readonly support: SupportControl;
   readonly plots: Plots;
   readonly #onError: PartEvents['onError'];
   readonly #figure: FigurePanel<SculptVariant, SculptPreset>;
@@ -63,6 +69,7 @@ export class SculptParts extends RunParts<SculptExample> {
     this.#figure = new FigurePanel<SculptVariant, SculptPreset>(events.onVariant);
     this.ellipsoids = new EllipsoidControls(events);
     this.film = new FilmControls(events);
+    this.support = new SupportControl(events.onSupport);
     this.plots = new Plots(history, SCULPT_PLOTS, true);
     this.options = new SculptOptionControls(INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
@@ -75,7 +82,7 @@ export class SculptParts extends RunParts<SculptExample> {
       over: [this.view.legend.element, this.view.editing.legend.element, this.previewNote, this.#captions],
       stage: (view, status) => [view, this.transport.element, status],
       setup: [
-        section(text('sculpt.sectionScene'), this.data.element, this.#figure.element),
+        section(text('sculpt.sectionScene'), this.data.element, this.support.element, this.#figure.element),
         section(text('sculpt.sectionEllipsoids'), this.ellipsoids.element),
         section(text('sculpt.sectionFilm'), this.film.element),
         this.paramsSection(),
@@ -91,7 +98,7 @@ export class SculptParts extends RunParts<SculptExample> {
 
   /** Shows a newly opened scene: meshes with their texture, ellipsoids and facts, and warnings `known` before. */
   adopt(
-    { box, start, pose, detail, bands, buildMs, texture, warnings }: OpenedScene,
+    { box, start, pose, detail, bands, hasChoice, buildMs, texture, warnings }: OpenedScene,
     example: SculptExample | undefined,
     name: string,
     known: readonly Warning[] = [],
@@ -99,6 +106,7 @@ export class SculptParts extends RunParts<SculptExample> {
     this.saving.name = example?.id ?? name;
     this.warnings.showData(known, warnings);
     this.measures.unit = '';
+    this.support.hasChoice = hasChoice;
     this.view.setScene(box, example?.up ?? 'y', start, [pose, ...posesOf(example)]);
     this.#showTexture(texture);
     this.data.show(factsOf({ name, detail, bands, buildMs }), example);
@@ -121,6 +129,12 @@ export class SculptParts extends RunParts<SculptExample> {
       },
       (error) => this.#onError(text('sculpt.textureFailed'), error),
     );
+  }
+
+  showSupport(support: Support): void {
+    this.support.show(support);
+    this.options.membrane = support === 'membrane';
+    this.hideParams(Object.fromEntries(OF_MEMBRANES.map((name) => [name, support === 'surface'])));
   }
 
   showParams(params: ParamValues, preset: SculptPreset | undefined, variant: SculptVariant | undefined): void {

@@ -2,7 +2,7 @@ import { toFailure } from '../channel';
 import type { SculptClient } from '../sculpt/client';
 import { samePose } from '../sculpt/ellipsoids';
 import type { Film } from '../sculpt/film';
-import type { FrameEvent, ParamValues, Pose, SavedPose } from '../sculpt/protocol';
+import type { FrameEvent, ParamValues, Pose, SavedPose, Support } from '../sculpt/protocol';
 import type { Moments } from '../session/moments';
 import { text } from '../texts';
 import type { History, HistoryMark } from '../ui/history';
@@ -22,6 +22,9 @@ export type SculptMoments = Moments<SavedMoment<PageState, SavedPose>>;
 
 /** The settings that a scene (meshes and ellipsoids) of the Sculpt lab opens with. */
 export interface Adopted {
+  support: Support;
+  /** The ellipsoids with which the model was built. */
+  start: Pose;
   pose: Pose;
   names: string[];
   /** Whether the pose of the ellipsoids was set by hand, rather than by the example, so that links must contain it. */
@@ -42,6 +45,8 @@ export class SculptSettings {
   readonly #onChange: () => void;
   readonly #undo: UndoHistory<PageState, SavedPose>;
   #params: ParamValues = {};
+  #support: Support = 'membrane';
+  #start: Pose = [];
   #pose: Pose = [];
   #names: string[] = [];
   #chosen: number | undefined;
@@ -70,6 +75,15 @@ export class SculptSettings {
 
   get params(): ParamValues {
     return this.#params;
+  }
+
+  get support(): Support {
+    return this.#support;
+  }
+
+  /** The ellipsoids with which the model was built. */
+  get start(): Pose {
+    return this.#start;
   }
 
   get pose(): Pose {
@@ -102,8 +116,10 @@ export class SculptSettings {
   }
 
   /** Takes over the settings of a newly opened scene, and clears the undo history. */
-  adopt({ pose, names, posed, film, params }: Adopted): void {
+  adopt({ support, start, pose, names, posed, film, params }: Adopted): void {
     this.#undo.clear();
+    this.#support = support;
+    this.#start = start;
     this.#pose = pose;
     this.#names = named(names, pose.length);
     this.#posed = posed;
@@ -159,8 +175,9 @@ export class SculptSettings {
     const { carrier, latency } = this.#ui;
     const at = performance.now();
     latency.poseSent(this.#poseId, at);
-    // After the drawing, which has requested the same animation frame.
-    if (dragging && carrier.dragTo(this.#pose, this.#poseId))
+    // After the drawing, which has requested the same animation frame. A surface that holds itself follows otherwise.
+    const isCarried = dragging && this.#support === 'membrane';
+    if (isCarried && carrier.dragTo(this.#pose, this.#poseId))
       requestAnimationFrame(() => latency.carried(performance.now() - at));
   }
 
@@ -253,12 +270,15 @@ export class SculptSettings {
 
   /**
    * Has the worker build a new model of the same meshes with the parameters in force, which does not run yet; clears
-   * the undo history. `start` are the ellipsoids before the first step; undefined keeps those of the previous model.
+   * the undo history. The ellipsoids are those of the previous model if that has the same `support`.
    */
-  rebuild(start: Pose | undefined): Promise<void> {
+  rebuild(support = this.#support): Promise<void> {
     return this.#states.enqueue(async () => {
-      const ready = await this.#client.request('rebuild', { start, params: this.#params, pose: undefined });
+      const setup = { start: undefined, params: this.#params, pose: undefined, support };
+      const ready = await this.#client.request('rebuild', setup);
       this.#undo.clear();
+      if (support !== this.#support) [this.#film, this.#chosen] = [undefined, undefined];
+      [this.#support, this.#start] = [support, ready.start];
       this.#pose = ready.pose;
       this.#names = named(this.#names, ready.pose.length);
       this.#params = ready.params;

@@ -2,7 +2,7 @@ import { SculptClient } from '../sculpt/client';
 import type { SculptExample } from '../sculpt/examples';
 import { lastFrame } from '../sculpt/film';
 import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
-import type { FrameContents, FrameEvent, ParamValues, SculptQuantity, WorkerEvent } from '../sculpt/protocol';
+import type { FrameContents, FrameEvent, ParamValues, SculptQuantity, Support, WorkerEvent } from '../sculpt/protocol';
 import { contentOf } from '../session/recognise';
 import type { ContentOf } from '../session/schema';
 import type { LabState } from '../state';
@@ -92,6 +92,7 @@ export class SculptLab extends RunLab<SculptExample> {
       onRecord: () => void this.#filming.record(),
       onCancelRecord: () => void this.client.request('cancelRecord', undefined),
       onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.ui.labelOf(name)),
+      onSupport: (support) => void this.#setSupport(support),
       onOptions: (options) => this.#setOptions(options),
     };
   }
@@ -111,8 +112,16 @@ export class SculptLab extends RunLab<SculptExample> {
     this.#results.clear();
     this.ui.adopt(opened, example, name, source.warnings);
     const film = filmOf(linked ?? { params: {} }, example?.film);
-    const { pose, params } = opened;
-    this.#settings.adopt({ pose, names: example?.names ?? [], posed: linked?.pose !== undefined, film, params });
+    const { support, start, pose, params } = opened;
+    this.#settings.adopt({
+      support,
+      start,
+      pose,
+      names: example?.names ?? [],
+      posed: linked?.pose !== undefined,
+      film,
+      params,
+    });
     const color = (linked?.color ?? example?.color ?? 'plain') as SculptViewOptions['color'];
     const layout = (linked?.layout ?? example?.layout ?? 'result') as SculptViewOptions['layout'];
     const preset = isSculptPreset(example) ? example : undefined;
@@ -168,7 +177,8 @@ export class SculptLab extends RunLab<SculptExample> {
   }
 
   #showSettings(): void {
-    const { params, pose } = this.#settings;
+    const { params, pose, support } = this.#settings;
+    this.ui.showSupport(support);
     const example = this.opening.source?.example;
     const preset = isSculptPreset(example) ? example : undefined;
     this.ui.showParams(params, preset, preset && variantInForce(preset, pose, params, this.#usual));
@@ -205,10 +215,20 @@ export class SculptLab extends RunLab<SculptExample> {
     this.#settings.checkpoint(change);
   }
 
+  /** Builds another model of the same surface, with another support. */
+  async #setSupport(support: Support): Promise<void> {
+    if (this.states.canChange) await this.#build(support);
+    this.ui.showSupport(this.#settings.support);
+  }
+
   /** Rebuilds the model, with the ellipsoids in the scene's start pose and the history of steps cleared. */
   protected startOver(): Promise<void> {
+    return this.#build(this.#settings.support);
+  }
+
+  #build(support: Support): Promise<void> {
     return this.building(async () => {
-      await this.#settings.rebuild(undefined);
+      await this.#settings.rebuild(support);
       this.#results.startOver();
       await this.client.request('show', this.#shown);
     });
@@ -219,10 +239,10 @@ export class SculptLab extends RunLab<SculptExample> {
   }
 
   protected address({ example, name: file }: SculptSource): string {
-    const { params, pose: present, posed, film } = this.#settings;
+    const { params, support, start, pose: present, posed, film } = this.#settings;
     const { color, layout } = this.ui.options.value;
     const pose = posed ? present : undefined;
-    return toHash(linkOf({ example, file, params, usual: this.#usual, pose, film, color, layout }));
+    return toHash(linkOf({ example, file, params, usual: this.#usual, support, start, pose, film, color, layout }));
   }
 
   #onEvent(event: WorkerEvent): void {

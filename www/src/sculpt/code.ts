@@ -19,7 +19,11 @@ export function originsOf(source: SceneSource): Origins {
 }
 
 /** Returns how code makes the model of a set-up. */
-export function programOf({ start, params }: PoseLog['setup'], origins: Origins, stem: string): Program {
+export function programOf(
+  { start, params, support = 'membrane' }: PoseLog['setup'],
+  origins: Origins,
+  stem: string,
+): Program {
   const meshes = Object.entries(origins);
   /** Files and the parameters for their bytes. */
   const inputs: [file: string, parameter: string][] = [];
@@ -34,7 +38,10 @@ export function programOf({ start, params }: PoseLog['setup'], origins: Origins,
   }
   const [files, parameters] = [inputs.map(([file]) => file), inputs.map(([, parameter]) => parameter)];
   const needs = meshes.some(([, origin]) => isGlobe(origin)) ? 'saved' : 'files';
-  const options = literal({ ellipsoids: start, params: chosen('multires', params) }).slice(2);
+  // The default of a detail without a base is the surface.
+  const usual = 'detail' in origins && !('base' in origins) ? 'surface' : 'membrane';
+  const stated = support === usual ? {} : { support };
+  const options = literal({ ellipsoids: start, ...stated, params: chosen('multires', params) }).slice(2);
   return {
     ...(inputs.length > 0 && bytesOf(files, parameters, needs)),
     names: ['MultiresolutionModel', ...(meshes.length > 0 ? ['Mesh'] : [])],

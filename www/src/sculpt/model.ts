@@ -57,11 +57,15 @@ export function freeScene({ detail, base }: Scene): void {
 const FIT_SCALES = [1, 0.8, 0.6, 0.4];
 
 /**
- * Builds the first model of a scene; also returns the ellipsoids it starts with: those in `setup`, else fitted to the
- * mesh or, without a mesh, a unit ball.
+ * Builds the first model of a scene; also returns the ellipsoids it starts with: those in `setup`, else those that a
+ * surface that holds itself proposes, or for a membrane fitted to the mesh or, without a mesh, a unit ball.
  */
 export function firstModel(scene: Scene, setup: Setup): { model: MultiresolutionModel; start: Pose } {
   const mesh = scene.detail ?? scene.base;
+  if (setup.support === 'surface') {
+    const model = buildModel(scene, setup.start ?? [], setup);
+    return { model, start: setup.start ?? model.ellipsoids };
+  }
   if (setup.start || !mesh) {
     const start = setup.start ?? DEFAULT_ELLIPSOIDS;
     return { model: buildModel(scene, start, setup), start };
@@ -92,8 +96,9 @@ export function restoredModel(scene: Scene, setup: Setup, { state, start }: Save
 }
 
 /** Builds a model of a scene's meshes with its ellipsoids in the pose `start`; the caller then sets the target pose. */
-export function buildModel({ detail, base }: Scene, start: Pose, { params }: Setup): MultiresolutionModel {
+export function buildModel({ detail, base }: Scene, start: Pose, { params, support }: Setup): MultiresolutionModel {
   return new MultiresolutionModel({
+    support,
     ellipsoids: start,
     params: params as MultiresParams,
     ...(detail && { detail }),

@@ -31,6 +31,9 @@ export type { ControlEllipsoid, Failure, MeshTexture, NamedBytes, ParamSpec, Par
 /** All control ellipsoids of a model, in a fixed order. */
 export type Pose = ControlEllipsoid[];
 
+/** What supports a surface: itself, or a membrane over the ellipsoids as in the paper. */
+export type Support = 'surface' | 'membrane';
+
 /** Source of a mesh: a file with its texture, if any, or a computed shape. */
 export type MeshSource = { file: NamedBytes; texture?: MeshTexture; beside?: NamedBytes[] } | { shape: ComputedMesh };
 
@@ -42,9 +45,11 @@ export interface SceneSource {
 
 /** Settings that a model is built with, besides its meshes. */
 export interface Setup {
+  support: Support;
   /**
-   * The control ellipsoids before the first step. If undefined, the request `open` fits them to the mesh (a unit ball
-   * if there is none), and `rebuild` keeps those of the previous model.
+   * The control ellipsoids before the first step. If undefined, the request `open` proposes those of a surface that holds
+   * itself, fits those of a membrane to the mesh (a unit ball if there is none), and `rebuild` keeps those of the previous
+   * model, if that has the same support.
    */
   start: Pose | undefined;
   /** Parameters of the method that differ from the defaults. */
@@ -70,6 +75,9 @@ export interface OpenedScene extends Ready {
   /** Number of triangles of the detailed surface; undefined if there is none. */
   detail: number | undefined;
   bands: number;
+  support: Support;
+  /** Whether the surface can have either support: it is a detail without a base. */
+  hasChoice: boolean;
   /** The texture of the surface; undefined if it has none. */
   texture: MeshTexture | undefined;
   /** Warnings about the meshes. */
@@ -107,6 +115,8 @@ export interface FrameContents {
 /** A saved model, from which the worker can restore it; kept by the page for undo. */
 export interface SavedPose {
   state: Uint8Array;
+  /** What supports the surface; a membrane if undefined, as in sessions of earlier versions. */
+  support?: Support | undefined;
   /** The ellipsoids with which the model was built. */
   start: Pose;
   iteration: number;
@@ -117,7 +127,7 @@ export interface SavedPose {
 }
 
 /** Log of a model: what it was built from, and all calls since. */
-export type PoseLog = RunLog<{ start: Pose; params: ParamValues }>;
+export type PoseLog = RunLog<{ start: Pose; params: ParamValues; support?: Support | undefined }>;
 
 /**
  * Facts that the page displays besides the measures of the mesh: about the detail and the map T, which takes the

@@ -34,6 +34,7 @@ import type {
   SavedPose,
   Setup,
   ShownMessage,
+  Support,
   WorkerEvent,
 } from './protocol';
 import { recorded } from './recording';
@@ -55,6 +56,7 @@ class Session {
   readonly #logs = new Map<string, PoseLog | undefined>();
   #preview = new Preview();
   #start: Pose = [];
+  #support: Support = 'membrane';
   #view: FrameContents = { layout: 'result', quantity: undefined, textured: false };
   readonly #path = new TargetPath();
   #dragging = false;
@@ -137,7 +139,9 @@ class Session {
       const detail = scene.detail?.triangleCount;
       const { texture, warnings } = mesh;
       const buildMs = performance.now() - began;
-      return { ...ready, box: mesh.info().bounds, detail, bands, texture, warnings, buildMs };
+      const hasChoice = detail !== undefined && !scene.base;
+      const { support } = setup;
+      return { ...ready, box: mesh.info().bounds, detail, bands, support, hasChoice, texture, warnings, buildMs };
     } catch (error) {
       freeScene(scene);
       throw error;
@@ -146,16 +150,18 @@ class Session {
 
   async #rebuild(setup: Setup): Promise<Ready> {
     await this.#run.stop();
-    const start = setup.start ?? this.#start;
-    return this.#adopt(buildModel(this.#scene, start, setup), start, setup);
+    const start = setup.start ?? (setup.support === this.#support ? this.#start : undefined);
+    const first = firstModel(this.#scene, { ...setup, start });
+    return this.#adopt(first.model, first.start, setup);
   }
 
-  #adopt(built: Model, start: Pose, { params, pose }: Setup): Ready {
+  #adopt(built: Model, start: Pose, { params, pose, support }: Setup): Ready {
     this.#model?.free();
     const model = logged(built, this.#log, ['step', 'setParams', 'setEllipsoids']);
     this.#model = model;
-    this.#log.begin({ start, params });
+    this.#log.begin({ start, params, support });
     this.#start = start;
+    this.#support = support;
     this.#preview = new Preview();
     this.#dragging = false;
     this.#path.rewind(0);
@@ -239,7 +245,8 @@ class Session {
   #next(): void {
     const model = this.#current();
     this.#path.next(model);
-    this.#preview.prepare(model, this.#motion(), this.#durationMs);
+    // A surface that holds itself has no other resolution.
+    if (this.#support === 'membrane') this.#preview.prepare(model, this.#motion(), this.#durationMs);
     const began = performance.now();
     const report = model.step(1);
     this.#durationMs = performance.now() - began;
@@ -314,7 +321,8 @@ class Session {
   }
 
   #originals(): Requests['originals']['reply'] {
-    const model = buildModel(this.#scene, this.#start, { start: undefined, params: {}, pose: undefined });
+    const setup = { start: undefined, params: {}, pose: undefined, support: this.#support };
+    const model = buildModel(this.#scene, this.#start, setup);
     const { detail } = this.#scene;
     try {
       return { base: surfaceOf(model.baseMesh), detail: detail && surfaceOf(detail) };
@@ -349,6 +357,7 @@ class Session {
     if (this.#logs.size > MOST_LOGS) this.#logs.delete(oldest);
     return {
       state: this.#current().save(),
+      support: this.#support,
       start: this.#start,
       iteration: this.#iteration,
       frame: this.#path.frame,

@@ -44,6 +44,15 @@ export class SculptOptionControls extends OptionControls<SculptViewOptions> {
     if (entry) entry.hidden = !staged;
   }
 
+  /** Whether the surface is a detail on a membrane; else there is nothing besides the result to show. */
+  set membrane(membrane: boolean) {
+    for (const layout of ['base', 'pair', 'row', 'levels']) {
+      const entry = this.entryOf('layout', layout);
+      if (entry) entry.hidden = !membrane;
+    }
+    if (!membrane && this.value.layout !== 'result') this.set({ layout: 'result' });
+  }
+
   /** Whether the surface has a texture to show; if not, it is not offered, and a textured surface becomes plain. */
   set textured(textured: boolean) {
     const entry = this.entryOf('color', 'texture');

@@ -11,8 +11,10 @@ const LONG = 4;
 const OF_RESULTS: readonly string[] = [
   'begins-in-frame',
   'ends-in-frame',
+  'handle-stopped',
   'handles',
   'no-boundary',
+  'self-intersecting',
   'small-object',
   'thin-label',
   'thin-parts',

@@ -1,6 +1,6 @@
 /** Sessions of the Sculpt lab. */
 import { literal, minLength, object, optional, pipe, strictTuple, union, variant } from 'valibot';
-import type { Layout } from '../../sculpt/protocol';
+import type { Layout, Support } from '../../sculpt/protocol';
 import { call, camera, history, log, reports, session, steps, undoable } from './parts';
 import { color } from './reconstruct';
 import { between, bytes, count, flag, list, maybe, name, oneOf, params, text, vec3 } from './values';
@@ -12,9 +12,10 @@ const film = union([
   object({ motion: literal('lava'), loop: flag }),
 ]);
 const calls = variant('call', [steps, call('setParams', params), call('setEllipsoids', pose)]);
+const support = optional(oneOf<Support>({ surface: true, membrane: true }));
 const moment = {
   state: bytes,
-  model: object({ start: pose, iteration: count, frame: count, log: optional(text(100)) }),
+  model: object({ start: pose, support, iteration: count, frame: count, log: optional(text(100)) }),
   page: object({ names: list(name, 10_000), posed: flag, film: maybe(film), history }),
 };
 const layout = oneOf<Layout>({ result: true, base: true, pair: true, row: true, levels: true, stages: true });
@@ -23,5 +24,5 @@ const view = object({ camera, options: object({ layout, edges: flag, ellipsoids:
 export const sculpt = object({
   ...{ lab: literal('sculpt'), ...session },
   ...{ ...moment, undo: undoable(moment), redo: undoable(moment), reports, view: optional(view) },
-  ...{ params: optional(params, () => ({})), log: optional(log(object({ start: pose, params }), calls)) },
+  ...{ params: optional(params, () => ({})), log: optional(log(object({ start: pose, params, support }), calls)) },
 });
