@@ -9,7 +9,7 @@ export class SupportControl {
     { value: 'surface', label: text('sculptPanels.supportSurface') },
     { value: 'membrane', label: text('sculptPanels.supportMembrane') },
   ]);
-  readonly #field = new Field(this.#select, { label: text('sculptPanels.support'), help: '' });
+  readonly #field = new Field(this.#select, { label: text('sculptPanels.support'), help: '', row: 'row' });
 
   constructor(onSupport: (support: Support) => void) {
     this.element = this.#field.element;
