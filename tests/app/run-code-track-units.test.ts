@@ -37,6 +37,7 @@ async function interactiveRun(seed: number, source: ImageSource): Promise<Uint8A
     preparation: pick([PLAIN, { ...PLAIN, enrichment: 'linear' }, { binning: 2, enrichment: 'flow', factor: 2 }]),
     box: pick([undefined, { min: [3, 3, 0.1], max: [58, 57, 55] }]),
     at: pick([undefined, [31, 31, 28]]),
+    cavity: pick([undefined, 'closed']),
     params: { windowFrames: 1, ...params() },
   });
   const can: (() => Promise<unknown>)[] = [

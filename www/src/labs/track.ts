@@ -39,6 +39,8 @@ export class TrackLab extends RunLab<TrackExample> {
   readonly #settings: TrackSettings;
   readonly #asking: TrackAsking;
   #volume: VolumeView | undefined;
+  /** Whether the image that is opened again is not to be run. */
+  #stays = false;
   /** Number of slices of the image before its preparation, which may insert some. */
   #slices = 1;
   #truth: number[] | undefined;
@@ -96,7 +98,7 @@ export class TrackLab extends RunLab<TrackExample> {
   #events(): PartEvents {
     return {
       ...this.runEvents(),
-      onCancel: () => void (this.#asking.cancel() || this.opening.cancel()),
+      onCancel: () => this.#cancel(),
       onAsk: () => void this.#toggleAsking(),
       onHere: () => this.#asking.isOpen && this.#asking.here(),
       onMoving: (where) => this.#asking.moving(where),
@@ -121,6 +123,8 @@ export class TrackLab extends RunLab<TrackExample> {
   /** Displays a newly opened image, with the settings of its example or link, and tracks it, or asks for the object in it. */
   async #adopt(opened: OpenedTrack, source: TrackSource, reopening: boolean): Promise<void> {
     const { name, example, linked, session } = source;
+    const stays = reopening && this.#stays;
+    this.#stays = false;
     const asks = reopening ? this.#asking.isOpen : !example && !isChosen(linked ?? {});
     this.#asking.end();
     const { setup, moments } = opened;
@@ -137,7 +141,8 @@ export class TrackLab extends RunLab<TrackExample> {
     if (setup.box && this.#region) this.ui.view.fitRegion(this.#region);
     const crosshair = (setup.at === example?.at && example?.crosshair) || setup.at;
     if (crosshair) this.ui.view.goTo(crosshair);
-    if (asks) this.#ask();
+    if (asks || (stays && this.#isUntouched)) this.#ask();
+    else if (stays) this.states.idle(text('labs.cancelled'));
     else await this.client.request('play', undefined);
   }
 
@@ -157,6 +162,13 @@ export class TrackLab extends RunLab<TrackExample> {
     this.#asking.begin();
     this.ui.status.say(this.describe());
     this.ui.object.element.scrollIntoView({ block: 'nearest' });
+  }
+
+  /** Cancels what the worker is busy with. If that is the present image, it is opened again, and not run by itself. */
+  #cancel(): void {
+    if (this.#asking.cancel()) return;
+    this.#stays = !this.states.isOpening;
+    void this.opening.cancel();
   }
 
   #askingChanged(): void {
