@@ -61,6 +61,8 @@ export class TrackAsking {
     options.set({ ...options.value, below: 'slices', region: true });
     object.open = true;
     this.#toggled();
+    // On a narrow page it is below the view.
+    object.element.scrollIntoView({ block: 'nearest' });
   }
 
   end(): void {

@@ -161,7 +161,6 @@ export class TrackLab extends RunLab<TrackExample> {
     await this.client.request('pause', undefined);
     this.#asking.begin();
     this.ui.status.say(this.describe());
-    this.ui.object.element.scrollIntoView({ block: 'nearest' });
   }
 
   /** Cancels what the worker is busy with. If that is the present image, it is opened again, and not run by itself. */

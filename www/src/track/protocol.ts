@@ -69,7 +69,7 @@ export interface Box {
   max: Vec3;
 }
 
-/** What counts as inside the surface: with `closed` also muscles within a chamber of a heart, with `open` only what is bright. */
+/** The inside of the surface: with `closed` also muscles within a chamber of a heart, with `open` only what is bright. */
 export type Cavity = 'closed' | 'open';
 
 /** Settings that a tracker is built with, besides the image. */
@@ -89,7 +89,7 @@ export interface Setup {
 }
 
 /**
- * What a proposal is asked for: the object at a point in a frame, what moves most in a box, or by default in the whole image;
+ * An object to propose settings for: at a point in a frame, or the one that moves most in a box, or else in the whole image;
  * positions in world coordinates.
  */
 export type ObjectQuery = { point: Vec3; frame: number } | { box: Box } | Record<string, never>;

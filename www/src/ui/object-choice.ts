@@ -37,7 +37,8 @@ export class ObjectChoice {
     this.element = h(
       'div',
       { class: 'object-choice', role: 'group', 'aria-label': text('trackPanels.objectGroup'), hidden: true },
-      h('p', {}, h('strong', {}, text('trackPanels.objectClick')), ' ', text('trackPanels.objectHelp')),
+      h('p', {}, h('strong', {}, text('trackPanels.objectClick'))),
+      h('p', { class: 'help' }, text('trackPanels.objectHelp')),
       this.#refusal,
       h('div', { class: 'buttons' }, this.#here, this.#box, this.#moving, this.#whole, this.#keep),
     );

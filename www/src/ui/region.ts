@@ -15,7 +15,7 @@ export interface RegionEvents {
   onCavity: (cavity: Cavity) => void;
 }
 
-/** What the controls of the region show. */
+/** Values that the controls of the region show. */
 export interface ShownRegion {
   region: VoxelBox;
   /** Whether the region is the whole image. */
