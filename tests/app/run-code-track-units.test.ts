@@ -77,3 +77,12 @@ test('the code of random runs gives the same surfaces, of a file', async () => {
   const surfaces = [await interactiveRun(7, source()), await interactiveRun(8, source())];
   await programs.expectSame(surfaces, [{ name: 'cine.nrrd', bytes: file }]);
 });
+
+test('the code says that cavities are closed, and nothing of those that are open', async () => {
+  const codeOf = async (cavity: Setup['cavity']) => {
+    await worker.request('open', { name: 'cine', source: { cine: CINE }, setup: { ...SETUP, cavity } });
+    return (await worker.request('code', { stem: 'cine', edits: [] })).code;
+  };
+  expect(await codeOf('closed')).toContain("cavity: 'closed'");
+  expect(await codeOf('open')).not.toContain('cavity');
+});

@@ -191,6 +191,27 @@ test('a proposal is cancelled at once, and the lab goes on to ask', LONG, async 
   await tracked();
 });
 
+test('a proposal that is cancelled when its tracker is being built stays, and is not run', LONG, async () => {
+  await dropped('late.nii');
+  await page.evaluate(() => {
+    const line = document.querySelector('.status');
+    const watch = new MutationObserver(() => {
+      if (!line?.textContent?.startsWith('Preparing')) return;
+      watch.disconnect();
+      document.querySelector<HTMLElement>('[data-action=cancel]')?.click();
+    });
+    if (line) watch.observe(line, { childList: true, characterData: true, subtree: true });
+  });
+  const states = await recordStates(page);
+  await page.click('[data-object=moving]');
+  await expect.poll(hash).toContain('cavity=closed');
+  await expect.poll(() => page.textContent('.status')).toBe('Cancelled.');
+  expect(await states()).not.toContain('running');
+  await page.click('[data-object=keep]');
+  await page.click('.play');
+  await tracked();
+});
+
 test('a change that is cancelled leaves the settings before, and the tracker does not run', LONG, async () => {
   await open(app, 'track?example=ventricle&at=largest');
   await reach(page, 'done');

@@ -146,11 +146,13 @@ export class TrackAsking {
     const params = { ...this.#settings.setup.params, threshold };
     const isInForce = await this.#settings.change({ ...places, params }, text('track.objectChange'));
     const isCancelled = !this.#settings.runs;
-    this.#settings.runs = !this.isOpen;
     if (isInForce && !isCancelled) {
       this.end();
       this.#events.onProposed(proposal, query);
-    } else if (isInForce) this.#ui.status.say(text('labs.cancelled'));
+      return;
+    }
+    this.#toggled();
+    if (isInForce) this.#ui.status.say(text('labs.cancelled'));
   }
 
   #refuse(error: unknown, query: ObjectQuery): void {
