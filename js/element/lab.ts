@@ -20,14 +20,15 @@ const SLICE_MS = 60;
 /** Largest number of steps of the method between two renderings. */
 const MAX_STEPS = 256;
 
-const ATTRIBUTES = ['src', 'method', 'start', 'levels', 'params', 'ellipsoids'];
+const ATTRIBUTES = ['src', 'method', 'start', 'levels', 'params', 'cavity', 'ellipsoids'];
 
 /**
  * The element `<vesicle-lab>`: loads `src`, runs a method on it, and shows the surface while it evolves.
  *
  * Attributes: `src`, the file; `method`, `deformable` (a volume, the default), `implicit` (points), `tracking` (a
- * volume with frames) or `multires` (a mesh, with `ellipsoids` as JSON for a membrane over them); `params` of the method as JSON; `levels` of
- * the pyramid and `start`, `contour` (the default) or `enclosing`, of the deformable model; `paused`, not to start
+ * volume with frames) or `multires` (a mesh, with `ellipsoids` as JSON for a membrane over them); `params` of the method as
+ * JSON; `levels` of the pyramid and `start`, `contour` (the default) or `enclosing`, of the deformable model; `cavity`, `open`
+ * (the default) or `closed`, of the tracker; `paused`, not to start
  * automatically. Changing an attribute other than `paused` restarts the method. Events: `vesicle-step` after one step
  * or a few, with a `StepReport` as `detail`, `vesicle-done`, `vesicle-error` with the error, `vesicle-warnings` when there
  * are others than before, with all {@link Warning}s. The parts `view`, `controls`, `status` and `warnings`, a list that is
@@ -115,6 +116,7 @@ export class VesicleLab extends HTMLElement {
     const settings = {
       start: parseStart(this.getAttribute('start')),
       levels: Number(this.getAttribute('levels') ?? 0),
+      cavity: this.getAttribute('cavity') ?? 'open',
       params: json<Record<string, unknown>>('params', this.getAttribute('params'), {}),
       ellipsoids: json('ellipsoids', this.getAttribute('ellipsoids'), []),
     };

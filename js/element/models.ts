@@ -24,6 +24,7 @@ export interface Settings {
   start: StartName;
   levels: number;
   params: Record<string, unknown>;
+  cavity: string;
   ellipsoids: ControlEllipsoid[];
 }
 
@@ -47,8 +48,9 @@ export const MODELS = {
     const { points, normals } = await parsePoints(bytes);
     return { model: await ImplicitSurface.create({ points, ...(normals && { normals }), params }), from: FRONT };
   },
-  tracking: ({ bytes, params }: Settings): Promise<ModelWithView> =>
-    ofVolume(bytes, (volume) => SurfaceTracker.create({ volume, params })),
+  // The tracker checks `cavity`.
+  tracking: ({ bytes, params, cavity }: Settings): Promise<ModelWithView> =>
+    ofVolume(bytes, (volume) => SurfaceTracker.create({ volume, params, cavity: cavity as 'open' })),
   multires: async ({ bytes, ellipsoids, params }: Settings): Promise<ModelWithView> => {
     // Ellipsoids that do not move show something with a membrane alone.
     const support = ellipsoids.length > 0 ? 'membrane' : 'surface';

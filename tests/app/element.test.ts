@@ -182,6 +182,19 @@ test('a volume with frames', LONG, async () => {
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
 });
 
+test('cavities of a volume with frames are open or closed, and nothing else', async () => {
+  const tracking = (cavity: string) =>
+    `<vesicle-lab src="beating.nii" method="tracking" cavity="${cavity}" paused></vesicle-lab>`;
+  await writeFile(join(folder, 'beating.nii'), beating().toNifti());
+  await open(tracking('closed'));
+  await state('paused');
+  await open(tracking('shut'));
+  await state('error');
+  expect(await page.locator('vesicle-lab output').textContent()).toMatch(
+    /^cavity: must be 'closed' or 'open', got 'shut'/,
+  );
+});
+
 test('removed from the page it stops, and inserted again it restarts', LONG, async () => {
   await open(`<vesicle-lab src="ring.mha" ${FROM_AFAR}></vesicle-lab>`);
   await state('done');

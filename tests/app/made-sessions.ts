@@ -120,7 +120,10 @@ const sculpt = record({
 const preparation = record({
   ...{ binning: constantFrom(1, 2), enrichment: constantFrom('none', 'flow'), factor: nat(16) },
 });
-const tracking = record({ preparation, box: maybe(record({ min: vec3, max: vec3 })), at: maybe(vec3), params });
+const tracking = record({
+  ...{ preparation, box: maybe(record({ min: vec3, max: vec3 })), at: maybe(vec3), params },
+  cavity: constantFrom('closed', 'open'),
+});
 const tracked = {
   state: bytes,
   model: record({ setup: tracking, iteration: count, done: flag, log: logOf(tracking, ['setParams', params]) }),

@@ -37,6 +37,7 @@ async function interactiveRun(seed: number, source: ImageSource): Promise<Uint8A
     preparation: pick([PLAIN, { ...PLAIN, enrichment: 'linear' }, { binning: 2, enrichment: 'flow', factor: 2 }]),
     box: pick([undefined, { min: [3, 3, 0.1], max: [58, 57, 55] }]),
     at: pick([undefined, [31, 31, 28]]),
+    cavity: pick([undefined, 'closed']),
     params: { windowFrames: 1, ...params() },
   });
   const can: (() => Promise<unknown>)[] = [
@@ -75,4 +76,13 @@ test('the code of random runs gives the same surfaces, of a file', async () => {
   const source = () => ({ files: [{ name: 'cine.nrrd', bytes: file.slice() }] });
   const surfaces = [await interactiveRun(7, source()), await interactiveRun(8, source())];
   await programs.expectSame(surfaces, [{ name: 'cine.nrrd', bytes: file }]);
+});
+
+test('the code says that cavities are closed, and nothing of those that are open', async () => {
+  const codeOf = async (cavity: Setup['cavity']) => {
+    await worker.request('open', { name: 'cine', source: { cine: CINE }, setup: { ...SETUP, cavity } });
+    return (await worker.request('code', { stem: 'cine', edits: [] })).code;
+  };
+  expect(await codeOf('closed')).toContain("cavity: 'closed'");
+  expect(await codeOf('open')).not.toContain('cavity');
 });

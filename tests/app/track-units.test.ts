@@ -260,6 +260,23 @@ describe('links', () => {
   test('ignore invalid settings', () => {
     const linked = fromHash('#track?box=1,2&at=x&binning=7&enrichment=magic&factor=-2&p.threshold=abc');
     expect(linked).toEqual({ params: { threshold: 'abc' }, preparation: {}, view: {} });
+    expect(fromHash('#track?cavity=shut')?.cavity).toBeUndefined();
+  });
+
+  test('from before cavities could be closed leave them open; those of closed ones are read as they were', () => {
+    const [example] = IMAGES;
+    expect(setupOf(example, fromHash('#track?binning=2'))).not.toHaveProperty('cavity');
+    const setup = { ...setupOf(undefined), cavity: 'closed' as const };
+    const linked = fromHash(toHash(linkOf({ example: undefined, file: 'a.nii', setup, view: viewOf(undefined) })));
+    expect(setupOf(undefined, linked)).toEqual(setup);
+  });
+
+  test('to the user’s own image say that it is tracked as a whole, unless the lab asks for the object', () => {
+    const given = { example: undefined, file: 'a.nii', setup: setupOf(undefined), view: viewOf(undefined) };
+    expect(toHash(linkOf({ ...given, asks: true }))).toBe('#track?file=a.nii');
+    const linked = fromHash(toHash(linkOf(given)));
+    expect(linked?.box).toBe('whole');
+    expect(setupOf(undefined, linked)).toEqual(given.setup);
     expect(fromHash('#track?box=whole&at=largest')).toMatchObject({ box: 'whole', at: 'largest' });
   });
 });

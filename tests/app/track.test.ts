@@ -71,11 +71,17 @@ function small(): { film: Uint8Array; frames: Uint8Array[] } {
   return { film: bytes(voxels, frames), frames: Array.from({ length: frames }, (_, t) => frame(t)) };
 }
 
-/** Opens the small image, in the lab, and waits until it is tracked. */
+/** Tracks the whole of an image that is open, instead of an object in it. */
+async function trackWhole(): Promise<void> {
+  await app.page.click('[data-object=whole]');
+}
+
+/** Opens the small image, in the lab, and waits until all of it is tracked. */
 async function dropSmall(): Promise<void> {
   if (!app.page.url().includes('#track')) await openAt('#track?example=ventricle', 'running', 'done');
   await drop(app.page, [{ name: 'small.nii', bytes: small().film }]);
   await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('small.nii'));
+  await trackWhole();
   await reach(app.page, 'done');
 }
 
@@ -181,6 +187,7 @@ describe('the user’s own image', () => {
     const before = (await measured()).volume;
     await drop(app.page, files.reverse());
     await expect.poll(() => text('.facts')).toContain(' + 3');
+    await trackWhole();
     await tracked(4);
     expect((await measured()).volume).toBe(before);
   });
@@ -274,7 +281,7 @@ describe('changes', () => {
     await tracked(4);
     expect(await last.inputValue()).toBe('14');
     await app.page.click('[data-box=whole]');
-    await expect.poll(hash).not.toContain('box=');
+    await expect.poll(hash).toContain('box=whole');
     await tracked(4);
   });
 
@@ -297,7 +304,7 @@ describe('changes', () => {
     expect(before).toBe('0');
     expect((last ?? 0) - (first ?? 0)).toBe(17);
     await app.page.click('[data-box=whole]');
-    await expect.poll(hash).not.toContain('box=');
+    await expect.poll(hash).toContain('box=whole');
     await tracked(4);
   });
 

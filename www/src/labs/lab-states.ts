@@ -47,6 +47,11 @@ export class LabStates {
     return this.value === 'error' ? this.#model : this.value;
   }
 
+  /** Whether other data is being opened. */
+  get isOpening(): boolean {
+    return this.#opening;
+  }
+
   /** Whether the settings can be changed now: there is a model, the engine works, and nothing is being loaded. */
   get canChange(): boolean {
     return this.ready && !this.engineBroken && this.value !== 'loading';

@@ -2,7 +2,7 @@
 import type { ParamValues, Vec3 } from '../protocol';
 import { IMAGES, OWN_PREPARATION, type TrackExample } from '../track/examples';
 import { viewOf } from '../track/presets';
-import type { Box, Enrichment, Preparation, Setup } from '../track/protocol';
+import type { Box, Cavity, Enrichment, Preparation, Setup } from '../track/protocol';
 import type { TrackViewOptions } from '../view/track';
 import { differing } from './link';
 import { listOf, paramsIn, queryOf, readValue, textsIn } from './link-query';
@@ -18,6 +18,7 @@ export interface LinkedTrack {
   preparation: Partial<Preparation>;
   box?: Box | 'whole';
   at?: Vec3 | 'largest';
+  cavity?: Cavity;
   view: Partial<TrackViewOptions>;
 }
 
@@ -27,6 +28,8 @@ export interface LinkableTrack {
   file: string;
   setup: Setup;
   view: TrackViewOptions;
+  /** Whether the lab asks for the object, so that the region and the surface are not chosen yet. */
+  asks?: boolean;
 }
 
 const SWITCHES = ['surface', 'edges', 'region'] as const;
@@ -37,11 +40,12 @@ const ENRICHMENTS: readonly string[] = ['none', 'linear', 'flow'] satisfies Enri
  * in a link.
  */
 export function setupOf(example: TrackExample | undefined, linked?: LinkedTrack): Setup {
-  const { box, at } = linked ?? {};
+  const { box, at, cavity } = linked ?? {};
   return {
     preparation: { ...(example?.preparation ?? OWN_PREPARATION), ...linked?.preparation },
     box: box === 'whole' ? undefined : (box ?? example?.box),
     at: at === 'largest' ? undefined : (at ?? example?.at),
+    ...(cavity === 'closed' && { cavity }),
     params: { ...example?.params, ...linked?.params },
   };
 }
@@ -50,29 +54,38 @@ export function setupOf(example: TrackExample | undefined, linked?: LinkedTrack)
  * Returns what a link to the lab's present state contains: the settings that differ from those of the example, or else
  * from the defaults.
  */
-export function linkOf({ example, file, setup, view }: LinkableTrack): LinkedTrack {
+export function linkOf({ example, file, setup, view, asks }: LinkableTrack): LinkedTrack {
   const usual = setupOf(example);
   const same = (one: unknown, other: unknown) => JSON.stringify(one) === JSON.stringify(other);
+  // Else the lab would ask for the object.
+  const isWhole = !example && !asks && !isChosen(setup);
   return {
     ...(!example && { file }),
     ...(example && example !== IMAGES[0] && { example: example.id }),
     params: differing(setup.params, usual.params),
     preparation: differing({ ...setup.preparation }, { ...usual.preparation }),
-    ...(!same(setup.box, usual.box) && { box: setup.box ?? 'whole' }),
+    ...((!same(setup.box, usual.box) || isWhole) && { box: setup.box ?? 'whole' }),
     ...(!same(setup.at, usual.at) && { at: setup.at ?? 'largest' }),
+    ...(setup.cavity === 'closed' && { cavity: setup.cavity }),
     view: differing({ ...view }, { ...viewOf(example) }),
   };
+}
+
+/** Tests whether a region or a surface was chosen, so that the lab need not ask for the object. */
+export function isChosen({ box, at }: Pick<LinkedTrack, 'box' | 'at'> | Setup): boolean {
+  return box !== undefined || at !== undefined;
 }
 
 const asText = (values: number[]) => values.map((value) => Number(value.toFixed(3))).join(',');
 
 /** Converts the settings in a link to the hash of an address. */
-export function toHash({ example, file, params, preparation, box, at, view }: LinkedTrack): string {
+export function toHash({ example, file, params, preparation, box, at, cavity, view }: LinkedTrack): string {
   const query = new URLSearchParams();
   for (const [name, value] of Object.entries({ example, file, ...preparation, ...view }))
     if (value !== undefined) query.set(name, String(value));
   if (box) query.set('box', box === 'whole' ? box : asText([...box.min, ...box.max]));
   if (at) query.set('at', at === 'largest' ? at : asText(at));
+  if (cavity) query.set('cavity', cavity);
   for (const [name, value] of Object.entries(params)) query.set(`p.${name}`, String(value));
   const text = query.toString().replaceAll('%2C', ',');
   return text ? `${ADDRESS}?${text}` : ADDRESS;
@@ -96,6 +109,7 @@ export function fromHash(hash: string): LinkedTrack | undefined {
   else if (query.get('box') === 'whole') linked.box = 'whole';
   if (at) linked.at = at as Vec3;
   else if (query.get('at') === 'largest') linked.at = 'largest';
+  if (query.get('cavity') === 'closed') linked.cavity = 'closed';
   return linked;
 }
 

@@ -26,16 +26,20 @@ export interface OpenedTrack extends OpenedFilm {
 export class TrackOpening extends Opening<TrackExample, LinkedTrack, ImageSource, OpenedTrack> {
   protected readonly first = IMAGES[0];
   readonly #client: TrackClient;
-  readonly #onOpened: (opened: OpenedTrack, source: TrackSource) => Promise<void>;
+  readonly #present: () => Setup;
+  readonly #onOpened: (opened: OpenedTrack, source: TrackSource, reopening: boolean) => Promise<void>;
 
+  /** `present` returns the setup in force, with which the image is opened again after a failure of the engine. */
   constructor(
     client: TrackClient,
     ui: TrackParts,
     states: LabStates,
-    onOpened: (opened: OpenedTrack, source: TrackSource) => Promise<void>,
+    present: () => Setup,
+    onOpened: (opened: OpenedTrack, source: TrackSource, reopening: boolean) => Promise<void>,
   ) {
     super(client, ui, states);
     this.#client = client;
+    this.#present = present;
     this.#onOpened = onOpened;
   }
 
@@ -59,15 +63,24 @@ export class TrackOpening extends Opening<TrackExample, LinkedTrack, ImageSource
     return 'files' in source ? source.files : [];
   }
 
-  protected async load({ name, example, linked, session }: TrackSource, source: ImageSource): Promise<OpenedTrack> {
+  /** Ends a proposal, which opening would wait for. */
+  protected override superseded(): void {
+    this.#client.request('cancelProposal', undefined).catch(() => undefined);
+  }
+
+  protected async load(
+    { name, example, linked, session }: TrackSource,
+    source: ImageSource,
+    reopening: boolean,
+  ): Promise<OpenedTrack> {
     const moments = session && (await import('./track-session')).unpackTrack(contentOf(session, 'track'));
     const saved = moments?.now.saved;
-    const setup = saved?.setup ?? setupOf(example, linked);
+    const setup = saved?.setup ?? (reopening ? this.#present() : setupOf(example, linked));
     return { ...(await this.#client.request('open', { name, source, setup, saved })), setup, moments };
   }
 
-  protected adopt(opened: OpenedTrack, source: TrackSource): Promise<void> {
-    return this.#onOpened(opened, source);
+  protected adopt(opened: OpenedTrack, source: TrackSource, reopening: boolean): Promise<void> {
+    return this.#onOpened(opened, source, reopening);
   }
 }
 

@@ -14,6 +14,7 @@ import { FrameBar } from '../ui/frame-bar';
 import { FrameTable } from '../ui/frame-table';
 import type { History } from '../ui/history';
 import { MeasurePanel } from '../ui/measures';
+import { ObjectChoice, type ObjectEvents } from '../ui/object-choice';
 import { PreparationControls } from '../ui/preparation';
 import { RegionControls, type RegionEvents } from '../ui/region';
 import { TrackComparePanel } from '../ui/track-compare';
@@ -36,7 +37,7 @@ export const INITIAL_VIEW: TrackViewOptions = {
   below: 'slices',
 };
 
-export interface PartEvents extends RunEvents<TrackExample>, RegionEvents {
+export interface PartEvents extends RunEvents<TrackExample>, RegionEvents, ObjectEvents {
   onVariant: (preset: TrackPreset, variant: TrackVariant) => void;
   onPreparation: (preparation: Preparation, what: string) => void;
   onOptions: (options: TrackViewOptions) => void;
@@ -57,6 +58,7 @@ export class TrackParts extends RunParts<TrackExample> {
   readonly options: OptionControls<TrackViewOptions>;
   readonly preparation: PreparationControls;
   readonly region: RegionControls;
+  readonly object: ObjectChoice;
   readonly frames: FrameBar;
   readonly curve: VolumeCurve;
   readonly stills: FigureRow;
@@ -87,6 +89,11 @@ export class TrackParts extends RunParts<TrackExample> {
     this.#figure = new FigurePanel<TrackVariant, TrackPreset>(events.onVariant);
     this.preparation = new PreparationControls(events.onPreparation);
     this.region = new RegionControls(events);
+    this.object = new ObjectChoice(events);
+    this.#slices.addEventListener('keydown', (event) => {
+      if (event.key === 'Enter' && event.target instanceof HTMLInputElement && event.target.type === 'range')
+        events.onHere();
+    });
     this.frames = new FrameBar(events.onFrame);
     const stopAt = (frame: number) => {
       this.frames.stop();
@@ -116,7 +123,7 @@ export class TrackParts extends RunParts<TrackExample> {
       over: [this.view.editing.legend.element],
       stage: (view, status) => [
         ...[view, this.frames.element, this.transport.element, status],
-        ...[this.#slices, this.stills.element],
+        ...[this.object.element, this.#slices, this.stills.element],
       ],
       setup: [
         section(text('track.sectionImage'), this.data.element, this.#figure.element),
@@ -189,6 +196,10 @@ export class TrackParts extends RunParts<TrackExample> {
     const idle = this.showRunState(state, beneath, ready, here);
     this.exports.enabled = idle && here;
     this.#sculpt.disabled = !idle || !here;
+    // While the lab asks for the object, there is nothing to run.
+    if (this.object.open) this.transport.showState(beneath, false);
+    this.object.enabled = idle;
+    this.region.enabled = idle;
     for (const save of this.#saves) save.disabled = !idle || tracked === 0;
     this.compare.enabled = idle && beneath === 'done';
   }

@@ -34,6 +34,8 @@ export class TrackSettings {
     at: undefined,
     params: {},
   };
+  /** Whether the tracker runs after a change. */
+  runs = true;
   #ready: Omit<Ready, 'volume'> = { params: {}, suggested: 1, noise: 0 };
 
   /**
@@ -59,6 +61,11 @@ export class TrackSettings {
       () => ({ record: results.record() }),
       (undoable, redoable) => ui.transport.showUndo(undoable, redoable),
     );
+  }
+
+  /** Whether the tracker has done a step. */
+  get wasRun(): boolean {
+    return !this.#results.isNew;
   }
 
   /** The setup of the tracker as requested; its `params` are only those set by the example, a link or the user. */
@@ -97,11 +104,12 @@ export class TrackSettings {
   }
 
   /**
-   * Changes the preparation of the image, the region of interest or the tracked component: builds a new tracker, and
-   * runs it. `what` names the change for undo.
+   * Changes the preparation of the image, the region of interest or what is tracked in it: builds a new tracker, and runs
+   * it. `what` names the change for undo. Returns whether the new settings are in force.
    */
-  change(changed: Partial<Omit<Setup, 'params'>>, what: string): Promise<void> {
-    return this.#states.enqueue(async () => {
+  async change(changed: Partial<Setup>, what: string): Promise<boolean> {
+    let isDone = false;
+    await this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
       await this.#client.request('pause', undefined);
       const forget = this.checkpoint(text('labs.changeOf', { name: what }));
@@ -112,7 +120,8 @@ export class TrackSettings {
         this.#take(setup, ready);
         this.#results.startOver();
         this.#states.idle(text('labs.ready'));
-        await this.#client.request('play', undefined);
+        isDone = true;
+        if (this.runs) await this.#client.request('play', undefined);
       } catch (error) {
         forget();
         // Cancelled: the engine is being restarted.
@@ -121,6 +130,7 @@ export class TrackSettings {
         this.#states.fail(text('track.settingsRejected', { what }), error);
       }
     });
+    return isDone;
   }
 
   /**
@@ -143,9 +153,9 @@ export class TrackSettings {
         this.#inForce();
         this.#ui.banner.hide();
         this.#results.rewind(iteration);
-        this.#states.idle(text('track.trackingAgain'));
+        this.#states.idle(text(this.runs ? 'track.trackingAgain' : 'labs.ready'));
         this.#onChange();
-        await this.#client.request('play', undefined);
+        if (this.runs) await this.#client.request('play', undefined);
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);

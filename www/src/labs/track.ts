@@ -8,7 +8,7 @@ import { boxOf, type VoxelBox, voxelsOf } from '../track/box';
 import { TrackClient } from '../track/client';
 import type { TrackExample } from '../track/examples';
 import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, viewOf } from '../track/presets';
-import type { Alternative, StepEvent, VolumeView, WorkerEvent } from '../track/protocol';
+import type { Alternative, StepEvent, Vec3, VolumeView, WorkerEvent } from '../track/protocol';
 import { prefersReducedMotion } from '../ui/dom';
 import { History } from '../ui/history';
 import { invert, sliceOrientations } from '../view/anatomy';
@@ -16,8 +16,9 @@ import { RunLab } from './lab-shell';
 import { LabStates } from './lab-states';
 import type { OpenInLab } from './labs';
 import { unitOf } from './surface-space';
+import { pointToShow, TrackAsking } from './track-asking';
 import { compareWith } from './track-comparing';
-import { linkOf, toHash } from './track-link';
+import { isChosen, linkOf, toHash } from './track-link';
 import { type OpenedTrack, TrackOpening, type TrackSource } from './track-opening';
 import { type PartEvents, TrackParts } from './track-parts';
 import { TrackResults } from './track-results';
@@ -36,7 +37,10 @@ export class TrackLab extends RunLab<TrackExample> {
   protected readonly opening: TrackOpening;
   readonly #results: TrackResults;
   readonly #settings: TrackSettings;
+  readonly #asking: TrackAsking;
   #volume: VolumeView | undefined;
+  /** Whether the image that is opened again is not to be run. */
+  #stays = false;
   /** Number of slices of the image before its preparation, which may insert some. */
   #slices = 1;
   #truth: number[] | undefined;
@@ -69,7 +73,17 @@ export class TrackLab extends RunLab<TrackExample> {
       () => this.#showSettings(),
       (volume) => this.#takeVolume(volume, true),
     );
-    this.opening = new TrackOpening(client, ui, states, (opened, source) => this.#adopt(opened, source));
+    this.#asking = new TrackAsking(client, ui, states, this.#settings, {
+      onToggle: () => this.#askingChanged(),
+      onProposed: (proposal, query) => this.#showProposed(pointToShow(proposal, query)),
+      onStuck: () => void this.opening.cancel(),
+      describe: () => this.describe(),
+    });
+    this.opening = new TrackOpening(
+      ...([client, ui, states] as const),
+      () => this.#settings.setup,
+      (opened, source, reopening) => this.#adopt(opened, source, reopening),
+    );
     this.beginRuns(
       [
         { key: 'b', shown: 'b', text: text('track.framesKey'), act: () => ui.frames.toggle() },
@@ -84,6 +98,13 @@ export class TrackLab extends RunLab<TrackExample> {
   #events(): PartEvents {
     return {
       ...this.runEvents(),
+      onCancel: () => this.#cancel(),
+      onAsk: () => void this.#toggleAsking(),
+      onHere: () => this.#asking.isOpen && this.#asking.here(),
+      onMoving: (where) => this.#asking.moving(where),
+      onWhole: () => void this.#trackWhole(),
+      onKeep: () => void this.#toggleAsking(),
+      onCavity: (cavity) => void this.#settings.change({ cavity }, text('trackPanels.cavity')),
       onVariant: (preset, variant) => this.#openVariant(preset, variant),
       onPreparation: (preparation, what) => void this.#settings.change({ preparation }, what),
       onRegion: (region) => this.#setRegion(region),
@@ -99,8 +120,13 @@ export class TrackLab extends RunLab<TrackExample> {
     };
   }
 
-  /** Displays a newly opened image, with the settings of its example or link, and starts tracking. */
-  async #adopt(opened: OpenedTrack, { name, example, linked, session }: TrackSource): Promise<void> {
+  /** Displays a newly opened image, with the settings of its example or link, and tracks it, or asks for the object in it. */
+  async #adopt(opened: OpenedTrack, source: TrackSource, reopening: boolean): Promise<void> {
+    const { name, example, linked, session } = source;
+    const stays = reopening && this.#stays;
+    this.#stays = false;
+    const asks = reopening ? this.#asking.isOpen : !example && !isChosen(linked ?? {});
+    this.#asking.end();
     const { setup, moments } = opened;
     this.states.ready = true;
     this.#slices = opened.dims[2];
@@ -115,12 +141,58 @@ export class TrackLab extends RunLab<TrackExample> {
     if (setup.box && this.#region) this.ui.view.fitRegion(this.#region);
     const crosshair = (setup.at === example?.at && example?.crosshair) || setup.at;
     if (crosshair) this.ui.view.goTo(crosshair);
-    await this.client.request('play', undefined);
+    if (asks || (stays && this.#isUntouched)) this.#ask();
+    else if (stays) this.states.idle(text('labs.cancelled'));
+    else await this.client.request('play', undefined);
+  }
+
+  /** Asks for the object to track. */
+  #ask(): void {
+    this.#asking.begin();
+    this.states.idle(this.describe());
+  }
+
+  async #toggleAsking(): Promise<void> {
+    if (this.#asking.isOpen) {
+      this.#asking.end();
+      this.ui.status.say(this.describe());
+      return;
+    }
+    await this.client.request('pause', undefined);
+    this.#asking.begin();
+    this.ui.status.say(this.describe());
+  }
+
+  /** Cancels what the worker is busy with. If that is the present image, it is opened again, and not run by itself. */
+  #cancel(): void {
+    if (this.#asking.cancel()) return;
+    this.#stays = !this.states.isOpening;
+    void this.opening.cancel();
+  }
+
+  #askingChanged(): void {
+    this.#showSettings();
+    this.showControls(this.states.value);
+  }
+
+  /** Shows an object for which settings were proposed. */
+  #showProposed(point: Vec3 | undefined): void {
+    if (this.#region) this.ui.view.fitRegion(this.#region);
+    if (point) this.ui.view.goTo(point);
+  }
+
+  /** Tracks the largest object of the whole image, without a proposal. */
+  async #trackWhole(): Promise<void> {
+    this.#asking.end();
+    const { box, at } = this.#settings.setup;
+    if (box || at) await this.#settings.change({ box: undefined, at: undefined }, text('track.regionChange'));
+    else await this.client.request('play', undefined);
   }
 
   /** Continues a session: shows its state and view, and does not run it. */
   async #resume(moments: Moments<TrackMoment>, view: ContentOf<'track'>['view']): Promise<void> {
     await this.#settings.resume(moments);
+    if (this.#isUntouched) this.#asking.begin();
     const state = moments.now.saved.done ? 'done' : 'paused';
     this.states.idle(this.#results.describe(state), state);
     if (!view) return;
@@ -156,11 +228,16 @@ export class TrackLab extends RunLab<TrackExample> {
     this.#results.setImage(volume, this.#slices, this.#truth, keep);
   }
 
+  /** Whether the image is the user's own and nothing in it was chosen or tracked. */
+  get #isUntouched(): boolean {
+    return !this.opening.source?.example && !isChosen(this.#settings.setup) && this.#results.isNew;
+  }
+
   /** The region of interest in voxels, the whole image by default; undefined if no image is open. */
   get #region(): VoxelBox | undefined {
     if (!this.#volume) return undefined;
     const { dims, affine } = this.#volume;
-    const { box } = this.#settings.setup;
+    const box = this.#asking.box ?? this.#settings.setup.box;
     if (!box) return { low: [0, 0, 0], high: [dims[0] - 1, dims[1] - 1, dims[2] - 1] };
     return voxelsOf(box, invert(affine), dims);
   }
@@ -169,12 +246,13 @@ export class TrackLab extends RunLab<TrackExample> {
     const volume = this.#volume;
     const present = this.#region;
     if (!volume || JSON.stringify(region) === JSON.stringify(present)) return;
-    const box = region && boxOf(region, volume.affine);
-    void this.#settings.change({ box }, text('track.regionChange'));
+    if (this.#asking.isOpen) this.#asking.draw(region, volume.affine);
+    else void this.#settings.change({ box: region && boxOf(region, volume.affine) }, text('track.regionChange'));
   }
 
   #setComponent(which: 'here' | 'largest'): void {
     const at = which === 'here' ? this.ui.view.crosshair.point : undefined;
+    this.#asking.end();
     void this.#settings.change({ at }, text('track.surfaceChange'));
   }
 
@@ -193,7 +271,9 @@ export class TrackLab extends RunLab<TrackExample> {
     const region = this.#region;
     if (region && this.#volume) {
       const names = sliceOrientations(this.#volume).map((frame) => frame.name);
-      this.ui.region.show(region, this.#volume.dims, names, setup.at, setup.box === undefined);
+      const { at: nearest, cavity } = setup;
+      const whole = setup.box === undefined && this.#asking.box === undefined;
+      this.ui.region.show({ region, whole, dims: this.#volume.dims, names, nearest, cavity });
       this.ui.view.showRegion(region);
     }
     const example = this.opening.source?.example;
@@ -210,6 +290,14 @@ export class TrackLab extends RunLab<TrackExample> {
     this.updateAddress();
   }
 
+  protected override get canPlay(): boolean {
+    return super.canPlay && !this.#asking.isOpen;
+  }
+
+  protected override get canStep(): boolean {
+    return this.canPlay;
+  }
+
   protected override beforeRun(change: string, isStep: boolean): void {
     this.#results.follow();
     if (isStep) this.#settings.checkpoint(change);
@@ -220,12 +308,15 @@ export class TrackLab extends RunLab<TrackExample> {
     return this.building(() => this.#settings.rebuild());
   }
 
-  protected travel(way: 'undo' | 'redo'): Promise<void> {
-    return this.#settings.travel(way);
+  protected async travel(way: 'undo' | 'redo'): Promise<void> {
+    this.#asking.end();
+    await this.#settings.travel(way);
+    if (this.#isUntouched) this.#ask();
   }
 
   protected address({ example, name: file }: TrackSource): string {
-    return toHash(linkOf({ example, file, setup: this.#settings.setup, view: this.ui.options.value }));
+    const { setup } = this.#settings;
+    return toHash(linkOf({ example, file, setup, view: this.ui.options.value, asks: this.#asking.isOpen }));
   }
 
   #frameToSculpt(): void {
@@ -302,6 +393,7 @@ export class TrackLab extends RunLab<TrackExample> {
   }
 
   protected describe(): string {
+    if (this.#asking.isOpen && this.states.modelState !== 'running') return text('track.asks');
     return this.#results.describe(this.states.value);
   }
 }

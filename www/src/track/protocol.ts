@@ -69,6 +69,9 @@ export interface Box {
   max: Vec3;
 }
 
+/** The inside of the surface: with `closed` also muscles within a chamber of a heart, with `open` only what is bright. */
+export type Cavity = 'closed' | 'open';
+
 /** Settings that a tracker is built with, besides the image. */
 export interface Setup {
   preparation: Preparation;
@@ -79,8 +82,26 @@ export interface Setup {
    * undefined, the largest component.
    */
   at: Vec3 | undefined;
+  /** If undefined, `open`: links, sessions and examples from before there was a choice are. */
+  cavity?: Cavity | undefined;
   /** Parameters set by the user; the others have the tracker's defaults, some of which it derives from the image. */
   params: ParamValues;
+}
+
+/**
+ * An object to propose settings for: at a point in a frame, or the one that moves most in a box, or else in the whole image;
+ * positions in world coordinates.
+ */
+export type ObjectQuery = { point: Vec3; frame: number } | { box: Box } | Record<string, never>;
+
+/** Settings proposed for an object. */
+export interface Proposal {
+  box: Box;
+  /** A point in the object, in the first frame that has it. */
+  at: Vec3;
+  cavity: Cavity;
+  /** Edge threshold τ, in intensity units. */
+  threshold: number;
 }
 
 /**
@@ -185,6 +206,9 @@ export interface Requests extends CodeRequests {
   };
   /** Builds a new tracker of the same image. On failure, the previous one stays in use. */
   rebuild: { body: Setup; reply: Ready };
+  /** Pauses the run and proposes settings for an object; replies with undefined if cancelled. */
+  propose: { body: ObjectQuery; reply: Proposal | undefined };
+  cancelProposal: { body: undefined; reply: undefined };
   play: { body: undefined; reply: undefined };
   pause: { body: undefined; reply: undefined };
   step: { body: { count: number }; reply: undefined };

@@ -6,12 +6,14 @@ import { invert } from '../view/anatomy';
 import { groupFiles } from '../worker/file-groups';
 import { Refusal } from '../worker/refusal';
 import { parseFiles } from '../worker/volumes';
-import { voxelsOf } from './box';
+import { boxOf, voxelsOf } from './box';
 import { cineVoxels } from './cine';
-import type { ImageSource, NamedBytes, Preparation, Setup } from './protocol';
+import type { ImageSource, NamedBytes, ObjectQuery, Preparation, Proposal, Setup } from './protocol';
 
 /** Seconds between frames of a computed image. */
 const CINE_SECONDS = 0.04;
+/** Digits of a proposed threshold, which is shown, and is in links and code: far finer than it could be chosen. */
+const THRESHOLD_DIGITS = 4;
 
 /** Opens a 4D image: reads it from files, or computes the phantom. */
 export async function openImage(source: ImageSource): Promise<Volume> {
@@ -78,11 +80,24 @@ export function factorsOf({ spacing }: Pick<Volume, 'spacing'>, binning: number)
 }
 
 /** Returns the options of a tracker, without the edge threshold τ. */
-export function trackerOptions({ affine, dims }: Pick<Volume, 'affine' | 'dims'>, { box, at, params }: Setup) {
+export function trackerOptions({ affine, dims }: Pick<Volume, 'affine' | 'dims'>, { box, at, cavity, params }: Setup) {
   const { threshold: _, ...others } = params;
   const region = box && voxelsOf(box, invert(affine), dims);
   const voxels = region && { min: region.low, max: region.high };
-  return { component: at ?? ('largest' as const), params: others, ...(voxels && { voxels }) };
+  return {
+    component: at ?? ('largest' as const),
+    params: others,
+    ...(voxels && { voxels }),
+    ...(cavity === 'closed' && { cavity }),
+  };
+}
+
+/** Proposes settings for an object in a prepared image; rejects with the signal's reason when it aborts. */
+export async function proposeFor(volume: Volume, query: ObjectQuery, signal: AbortSignal): Promise<Proposal> {
+  const { options } = await SurfaceTracker.propose(volume, query, { signal });
+  const { voxels, component: at, cavity, params } = options;
+  const threshold = Number(params.threshold.toPrecision(THRESHOLD_DIGITS));
+  return { box: boxOf({ low: voxels.min, high: voxels.max }, volume.affine), at, cavity, threshold };
 }
 
 /**

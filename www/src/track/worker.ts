@@ -18,9 +18,11 @@ import type {
   BoundaryVotes,
   ComparedTrack,
   NamedBytes,
+  ObjectQuery,
   OpenedImage,
   ParamValues,
   Preparation,
+  Proposal,
   Ready,
   Requests,
   SavedTrack,
@@ -28,7 +30,7 @@ import type {
   VolumeView,
   WorkerEvent,
 } from './protocol';
-import { buildTracker, openImage, prepare } from './source';
+import { buildTracker, openImage, prepare, proposeFor } from './source';
 
 /**
  * Parameters that the boundary depends on. If only others change, the boundary found in all frames is kept, provided
@@ -68,10 +70,13 @@ class Session {
   readonly #log = new RunRecorder<Setup>();
   readonly #run = new Work();
   readonly #comparison = new Work();
+  readonly #proposal = new Work();
 
   readonly handlers: Handlers<Requests> = {
     open: (body) => this.#open(body),
     rebuild: (setup) => this.#rebuild(setup),
+    propose: (query) => this.#propose(query),
+    cancelProposal: () => this.#proposal.stop(),
     play: () => this.#play(),
     pause: () => this.#pause(),
     step: ({ count }) => this.#step(count),
@@ -185,8 +190,21 @@ class Session {
     loaded.original.free();
   }
 
+  async #propose(query: ObjectQuery): Promise<Proposal | undefined> {
+    await this.#pause();
+    const { preparedVolume } = this.#image();
+    return this.#proposal.begin(async (signal) => {
+      try {
+        return await proposeFor(preparedVolume, query, signal);
+      } catch (error) {
+        if (signal.aborted) return undefined;
+        throw error;
+      }
+    });
+  }
+
   async #play(): Promise<undefined> {
-    await this.#comparison.stop();
+    await this.#stopOthers();
     const tracker = this.#current();
     if (this.#run.isUnderWay || this.#done) return;
     // Before the run starts, since its first step may already end it.
@@ -218,15 +236,30 @@ class Session {
   }
 
   async #pause(): Promise<undefined> {
-    await this.#comparison.stop();
+    await this.#stopOthers();
     return this.#run.stop();
   }
 
+  /** Ends what uses the image besides the run. */
+  async #stopOthers(): Promise<undefined> {
+    await this.#proposal.stop();
+    return this.#comparison.stop();
+  }
+
+  /** Does a number of steps, which can be paused as a run can: one may take minutes in a large image. */
   async #step(count: number): Promise<undefined> {
     await this.#pause();
     const tracker = this.#current();
+    if (count === 0 || this.#done) return this.#reportStopped();
+    send({ event: 'state', state: 'running' });
+    await this.#run.begin((signal) => this.#runSteps(tracker, count, signal));
+  }
+
+  async #runSteps(tracker: SurfaceTracker, maxIterations: number, signal: AbortSignal): Promise<void> {
     try {
-      for (let i = 0; i < count && !this.#done; i++) this.#stepped(tracker.step(1));
+      await tracker.run({ signal, maxIterations, onStep: (report) => this.#stepped(report) });
+    } catch (error) {
+      if (!signal.aborted) throw error;
     } finally {
       this.#reportStopped();
     }
@@ -288,7 +321,7 @@ class Session {
 
   async #restore({ state, setup, iteration, done, log }: SavedTrack): Promise<Ready> {
     await this.#pause();
-    const places = ({ preparation, box, at }: Setup) => ({ preparation, box, at });
+    const places = ({ preparation, box, at, cavity = 'open' }: Setup) => ({ preparation, box, at, cavity });
     const fits = this.#setup && same(places(this.#setup), places(setup));
     if (!fits) this.#build(setup);
     this.#current().restore(state);

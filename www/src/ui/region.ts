@@ -1,18 +1,36 @@
 import type { Vec3 } from '../protocol';
 import { text } from '../texts';
 import type { VoxelBox } from '../track/box';
+import type { Cavity } from '../track/protocol';
 import { SLICE_NAMES, type SliceOrientation } from '../view/anatomy';
 import { h } from './dom';
+import { Field } from './field';
 
 export interface RegionEvents {
   onRegion: (region: VoxelBox | undefined) => void;
   /** Called when the component to track is chosen: the one nearest to the crosshair, or the largest. */
   onComponent: (which: 'here' | 'largest') => void;
+  /** Called when the lab is to ask for the object to track, or no longer. */
+  onAsk: () => void;
+  onCavity: (cavity: Cavity) => void;
+}
+
+/** Values that the controls of the region show. */
+export interface ShownRegion {
+  region: VoxelBox;
+  /** Whether the region is the whole image. */
+  whole: boolean;
+  dims: Vec3;
+  /** Names of the slices across each voxel axis. */
+  names: SliceOrientation['name'][];
+  /** Point in world coordinates to which the tracked component is the nearest; the largest if undefined. */
+  nearest: Vec3 | undefined;
+  cavity: Cavity | undefined;
 }
 
 /**
- * Controls of the Track lab for the region of interest, by its first and last slice along each axis, and for the
- * component to track.
+ * Controls of the Track lab for the region of interest, by its first and last slice along each axis, for the component to
+ * track, and for what counts as inside it.
  */
 export class RegionControls {
   readonly element: HTMLElement;
@@ -21,21 +39,34 @@ export class RegionControls {
   readonly #whole: HTMLButtonElement;
   readonly #largest: HTMLButtonElement;
   readonly #here: HTMLButtonElement;
+  readonly #ask: HTMLButtonElement;
+  readonly #cavity = new Field(h('input', { type: 'checkbox', role: 'switch', 'data-cavity': 'closed' }), {
+    label: text('trackPanels.cavity'),
+    help: text('trackPanels.cavityHelp'),
+  });
   readonly #error = h('p', { class: 'field-error', role: 'alert' });
   readonly #followed = h('p', { class: 'help', 'data-component': '' });
   #dims: Vec3 = [1, 1, 1];
   #region: VoxelBox = { low: [0, 0, 0], high: [0, 0, 0] };
   readonly #onRegion: RegionEvents['onRegion'];
 
-  constructor({ onRegion, onComponent }: RegionEvents) {
+  constructor({ onRegion, onComponent, onAsk, onCavity }: RegionEvents) {
     this.#onRegion = onRegion;
     const rows = [0, 1, 2].map((axis) => this.#row(axis));
     this.#whole = button('box', 'whole', text('trackPanels.wholeImage'), () => onRegion(undefined));
     this.#largest = button('component', 'largest', text('trackPanels.largestComponent'), () => onComponent('largest'));
     this.#here = button('component', 'here', text('trackPanels.nearestComponent'), () => onComponent('here'));
+    this.#ask = h(
+      'button',
+      { type: 'button', class: 'wide', 'data-action': 'ask', onclick: onAsk },
+      text('trackPanels.ask'),
+    );
+    const { control } = this.#cavity;
+    control.addEventListener('change', () => onCavity(control.checked ? 'closed' : 'open'));
     this.element = h(
       'div',
       { class: 'region' },
+      this.#ask,
       h('p', { class: 'help' }, text('trackPanels.regionHelp')),
       ...rows,
       this.#error,
@@ -43,21 +74,21 @@ export class RegionControls {
       h('p', {}, text('trackPanels.trackedSurface')),
       h('div', { class: 'buttons' }, this.#largest, this.#here),
       this.#followed,
+      this.#cavity.element,
     );
   }
 
-  /**
-   * Shows the region of interest, and whether it is the `whole` image of dimensions `dims`. The component tracked is
-   * the one nearest to the world point `nearest`, or the largest if undefined. `names`: names of the slices across each
-   * voxel axis.
-   */
-  show(
-    region: VoxelBox,
-    dims: Vec3,
-    names: SliceOrientation['name'][],
-    nearest: Vec3 | undefined,
-    whole: boolean,
-  ): void {
+  /** Whether the lab asks for the object to track. */
+  set asks(asks: boolean) {
+    this.#ask.setAttribute('aria-pressed', String(asks));
+  }
+
+  set enabled(enabled: boolean) {
+    this.#ask.disabled = !enabled;
+  }
+
+  show({ region, whole, dims, names, nearest, cavity }: ShownRegion): void {
+    this.#cavity.control.checked = cavity === 'closed';
     this.#dims = dims;
     this.#region = region;
     for (const axis of [0, 1, 2]) {

@@ -56,8 +56,32 @@ export class RegionGrips {
     };
   }
 
+  /**
+   * Returns a grip that draws the region anew, as the rectangle from the position `from` to the pointer, both in voxels, on
+   * a slice across the axis `across`, along which the region stays. If the pointer moves by less than `slack`, that is a
+   * click, and nothing is drawn.
+   */
+  draw(from: Vec3, slack: Vec3, across: Axis, dims: Vec3, onClick: () => void): Grip {
+    const before = this.region ?? { low: [0, 0, 0], high: lastOf(dims) };
+    let isDrag = false;
+    return {
+      move: (to) => {
+        isDrag ||= from.some(
+          (start, axis) => axis !== across && Math.abs((to[axis] ?? start) - start) > (slack[axis] ?? 0),
+        );
+        if (!isDrag) return;
+        this.region = spanned(before, from, to, across, dims);
+        this.#onMove();
+      },
+      drop: () => {
+        if (isDrag && this.region) this.#onDrop(this.region);
+        else onClick();
+      },
+    };
+  }
+
   /** Draws the region's outline on a slice image; the scales are the voxel size on the canvas. */
-  draw(
+  drawOn(
     context: CanvasRenderingContext2D,
     orientation: SliceOrientation,
     dims: Vec3,
@@ -78,6 +102,20 @@ export class RegionGrips {
     context.strokeRect(x0 * scaleX, y0 * scaleY, (x1 - x0) * scaleX, (y1 - y0) * scaleY);
     context.restore();
   }
+}
+
+const lastOf = (dims: Vec3) => dims.map((n) => n - 1) as Vec3;
+
+/** Returns a region with the extent of a rectangle between two positions, but along the axis `across`. */
+function spanned(box: VoxelBox, from: Vec3, to: Vec3, across: Axis, dims: Vec3): VoxelBox {
+  const ends: VoxelBox = { low: [...box.low], high: [...box.high] };
+  for (const axis of ([0, 1, 2] as const).filter((axis) => axis !== across)) {
+    const [start, end] = [from[axis], to[axis]].map(Math.round).sort((a, b) => a - b) as [number, number];
+    const last = dims[axis] - 1;
+    ends.low[axis] = Math.max(0, Math.min(start, last - MIN_VOXELS + 1));
+    ends.high[axis] = Math.min(last, Math.max(end, ends.low[axis] + MIN_VOXELS - 1));
+  }
+  return ends;
 }
 
 function moved(box: VoxelBox, axis: Axis, side: 'low' | 'high', to: number, dims: Vec3): VoxelBox {

@@ -8,10 +8,10 @@ import type { BoundaryVotes } from '../track/protocol';
 import { onSchemeChange, token } from '../ui/dom';
 import type { PictureSubject } from '../ui/pictures';
 import type { SlicePlacement } from '../ui/view-options';
-import { nearestVoxel, slicePlane, toWorld } from './anatomy';
+import { type Axis, nearestVoxel, slicePlane, toWorld } from './anatomy';
 import { PointCloud } from './cloud';
 import { Lines } from './lines';
-import { SlicePanel } from './panel';
+import { type Grip, SlicePanel } from './panel';
 import { RegionGrips, regionEdges } from './region';
 import { greysOf, pictureSize, projectSegments } from './slicing';
 import type { StageView } from './stage';
@@ -54,6 +54,8 @@ export class TrackView {
   onRegion: (region: VoxelBox) => void = () => undefined;
   /** Called whenever the crosshair, and with it the slices, may have moved. */
   onMoved: () => void = () => undefined;
+  /** Called with the point that was clicked; if set, clicks in slices pick a point, and drags draw the region anew. */
+  onPick: ((point: Vec3) => void) | undefined;
   readonly #viewport: Viewport;
   readonly #slices: HTMLElement;
   readonly #surface: SurfaceObject;
@@ -100,8 +102,7 @@ export class TrackView {
       const panel: SlicePanel = new SlicePanel(volume, orientation, inverse, {
         onIndex: (index) => this.#moveSlice(orientation.axis, index),
         onPoint: (index) => this.#moveTo(index),
-        grab: (place, slack) =>
-          this.#options.region ? this.#grips.grab(place, slack, orientation.axis, volume.dims) : undefined,
+        grab: (place, slack) => this.#gripAt(place, slack, orientation.axis),
       });
       panel.overlay = (context, scaleX, scaleY) => this.#drawOver(panel, context, scaleX, scaleY);
       return panel;
@@ -163,6 +164,21 @@ export class TrackView {
       this.#preview[orientation.axis] = sliceVotes({ width, height, values }, halfWidth, leastDifference);
     }
     this.#redraw();
+  }
+
+  /** Returns the grip at a position on a slice across the axis `across`, in voxels, by which to move or draw the region. */
+  #gripAt(place: Vec3, slack: Vec3, across: Axis): Grip | undefined {
+    const { dims } = this.#scene?.volume ?? {};
+    if (!dims) return undefined;
+    const { region } = this.#grips;
+    // The sides of the whole image are no aim: an object may be there.
+    const hasSides = !this.onPick || (region && !isWhole(region, dims));
+    const side = this.#options.region && hasSides ? this.#grips.grab(place, slack, across, dims) : undefined;
+    if (side || !this.onPick || !isInside(place, dims)) return side;
+    return this.#grips.draw(place, slack, across, dims, () => {
+      this.#moveTo(nearestVoxel(place, dims));
+      this.onPick?.(this.crosshair.point);
+    });
   }
 
   /** Sets the region of interest, shown if the view options include it. */
@@ -292,7 +308,7 @@ export class TrackView {
     if (preview) drawFaces(context, preview, scaleX, scaleY);
     else if (this.#options.votes !== 'none' && this.#votes)
       drawVotes(context, this.#votes, { volume, inverse, orientation: panel.orientation, slice, scaleX, scaleY });
-    if (this.#options.region) this.#grips.draw(context, panel.orientation, volume.dims, scaleX, scaleY);
+    if (this.#options.region) this.#grips.drawOn(context, panel.orientation, volume.dims, scaleX, scaleY);
   }
 
   #placeSlices(viewer: Vector3): void {
@@ -311,6 +327,11 @@ export class TrackView {
     this.#votes = undefined;
   }
 }
+
+const isWhole = ({ low, high }: VoxelBox, dims: Vec3) =>
+  dims.every((size, axis) => low[axis] === 0 && high[axis] === size - 1);
+
+const isInside = (place: Vec3, dims: Vec3) => place.every((at, axis) => at >= -0.5 && at <= (dims[axis] ?? 0) - 0.5);
 
 /** Returns one frame of an image as a volume of its own, without a copy of its voxels. */
 export function frameOf({ dims, voxels, window }: VolumeView, frame: number): LevelView {

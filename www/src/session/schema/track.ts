@@ -1,6 +1,6 @@
 /** Sessions of the Track lab. */
 import { check, custom, literal, object, optional, picklist, pipe, strictTuple, variant } from 'valibot';
-import type { Enrichment, Surface } from '../../track/protocol';
+import type { Cavity, Enrichment, Surface } from '../../track/protocol';
 import type { ContentBelow, VisibleVotes } from '../../view/track';
 import { call, camera, history, log, placement, reports, session, steps, undoable } from './parts';
 import { anyNumber, between, bytes, count, flag, list, maybe, oneOf, params, real, vec3 } from './values';
@@ -9,6 +9,7 @@ const enrichment = oneOf<Enrichment>({ none: true, linear: true, flow: true });
 const setup = object({
   preparation: object({ binning: picklist([1, 2]), enrichment, factor: between(0, 1000) }),
   ...{ box: maybe(object({ min: vec3, max: vec3 })), at: maybe(vec3), params },
+  cavity: optional(oneOf<Cavity>({ closed: true, open: true })),
 });
 const calls = variant('call', [steps, call('setParams', params)]);
 const moment = {
