@@ -15,6 +15,8 @@ const FILL: f64 = 0.85;
 const LEAST: [f64; 2] = [0.2, 0.02];
 /// Least distance between two balls as a share of the diagonal of the surface: the surface between them has to follow both.
 const APART: f64 = 0.12;
+/// Largest distance of a point from a ball that touches the surface there, as a share of its radius.
+const TOUCH: f64 = 0.01;
 /// Maximum number of steps in which a ball shrinks.
 const STEPS: usize = 30;
 
@@ -23,7 +25,13 @@ pub(super) fn proposed(surface: &Band) -> Vec<ControlEllipsoid> {
     let bounds = Bounds::from_points(&surface.walker.mesh().positions);
     let diagonal = f64::from(bounds.min.distance(bounds.max));
     let apart = APART * diagonal;
-    let mut balls: Vec<Ball> = places(surface).filter_map(|at| inner_ball(surface, at, diagonal)).collect();
+    let mut balls: Vec<Ball> = Vec::new();
+    for at in places(surface) {
+        // Closest points are hard to tell in the middle of a sphere: one of its balls is enough.
+        if !balls.iter().any(|ball| ball.touches(at[0])) {
+            balls.extend(inner_ball(surface, at, diagonal));
+        }
+    }
     let largest = balls.iter().map(|ball| ball.radius).fold(0.0, f64::max);
     let least = (LEAST[0] * largest).min(LEAST[1] * diagonal);
     balls.retain(|ball| ball.radius >= least);
@@ -55,6 +63,11 @@ impl Ball {
             return None;
         }
         Some(if others.is_empty() { self.radius } else { self.radius * gap })
+    }
+
+    /// Returns whether a point of the surface is where this ball touches it, or nearly.
+    fn touches(&self, at: Vec3) -> bool {
+        (at.as_dvec3().distance(self.center) / self.radius - 1.0).abs() < TOUCH
     }
 
     fn ellipsoid(&self) -> ControlEllipsoid {
