@@ -12,7 +12,7 @@ const CODES: Record<WarningCode, true> = {
   'small-object': true,
   ...{ 'touches-box': true, handles: true, 'no-boundary': true, 'volume-jump': true },
   'thin-label': true,
-  'thin-parts': true,
+  ...{ 'thin-parts': true, outliers: true },
   ...{ precision: true, recentred: true, anisotropic: true, reader: true },
 };
 
