@@ -13,6 +13,7 @@ const OF_RESULTS: readonly string[] = [
   'ends-in-frame',
   'handles',
   'no-boundary',
+  'outliers',
   'small-object',
   'thin-label',
   'thin-parts',
