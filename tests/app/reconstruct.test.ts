@@ -361,8 +361,9 @@ describe('files', () => {
       if (lab) watch.observe(lab, { attributeFilter: ['data-state'] });
     });
     await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
-    expect(await app.page.inputValue('[data-param=lambdaSurface] input[type=number]')).toBe('0.001');
-    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz');
+    expect(await app.page.isChecked('[data-param=lambdaSurface] .automatic input')).toBe(true);
+    expect(await app.page.inputValue('[data-param=lambdaSurface] input[type=number]')).toMatch(/^0\.00\d+$/);
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz&v=2');
   });
 
   test.each([
@@ -391,7 +392,7 @@ describe('files', () => {
       await openAt('#reconstruct?p.lambdaSurface=0.002', 'done');
       await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
       expect(await measured()).toMatchObject({ components: 2 });
-      expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz');
+      expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz&v=2');
       await afterRun(app.page, () => setParam('lambdaSurface', '0.003'));
       await afterRun(app.page, () => drop(app.page, [{ name: 'again.xyz', bytes: asText('two balls') }]));
       expect(await app.page.evaluate(() => location.hash)).toBe(
@@ -445,6 +446,7 @@ describe('files', () => {
   });
 
   test('points given twice count once', LONG, async () => {
+    await openAt('#reconstruct?file=twice.xyz&v=2', 'done');
     const points = asText('two balls');
     const twice = new Uint8Array([...points, ...points]);
     await afterRun(app.page, () => drop(app.page, [{ name: 'twice.xyz', bytes: twice }]));

@@ -168,7 +168,9 @@ fn points_known_to_be_outside_do_not_let_noise_shrink_the_surface() {
     // Inside and outside are exchanged where the points say so.
     let (surface, has_warning) = known(around_torus(0.5));
     assert!(surface.evaluate(&[Vec3::X * 0.7]).unwrap()[0] < 0.0 && !has_warning);
-    assert!(!surface.constraints()[2].is_empty());
+    let inside = surface.constraints()[2].clone();
+    let from_ring = |p: &Vec3| p.distance(Vec3::new(p.x, p.y, 0.0).normalize() * 0.7);
+    assert!(!inside.is_empty() && inside.iter().all(|p| from_ring(p) > 0.3));
     // If they contradict each other, there is a warning, and no point inside.
     let (surface, has_warning) = known([around_torus(1.5), around_torus(0.5)].concat());
     assert!(surface.constraints()[2].is_empty() && has_warning);
@@ -197,6 +199,10 @@ fn lambda_that_is_chosen_may_be_given_for_many_points() {
         (*surface.choice().unwrap(), surface.evaluate(&[Vec3::ZERO, Vec3::X * 1.1]).unwrap())
     };
     let (chosen, values) = choice(ImplicitParams::default());
+    let length = 0.5 / chosen.density.sqrt() + 0.5 * chosen.noise;
+    // Half as much, as it is doubled for twice the usual number of points.
+    let expected = length * length * length * chosen.density / 4.0 / 2.0;
+    assert!((chosen.lambda_surface / expected - 1.0).abs() < 1e-9);
     let lambda_surface = Auto::Given(chosen.lambda_surface);
     assert_eq!(choice(ImplicitParams { lambda_surface, ..ImplicitParams::default() }), (chosen, values));
 }
