@@ -34,18 +34,18 @@ export const FIT_ROWS: ExtraMeasure[] = [
     text: count,
   },
   {
+    name: 'interiorConstraints',
+    label: text('reconstruct.interiorConstraints'),
+    help: text('reconstruct.interiorConstraintsHelp'),
+    text: count,
+  },
+  {
     name: 'spacing',
     label: text('reconstruct.spacing'),
     help: text('reconstruct.spacingHelp'),
     text: figure,
   },
   { name: 'cell', label: text('reconstruct.cell'), help: text('reconstruct.cellHelp'), text: figure },
-  {
-    name: 'interiorConstraints',
-    label: text('reconstruct.interiorConstraints'),
-    help: text('reconstruct.interiorConstraintsHelp'),
-    text: count,
-  },
   { name: 'noise', label: text('reconstruct.noise'), help: text('reconstruct.noiseHelp'), text: figure },
   { name: 'delta', label: text('reconstruct.deltaInForce'), help: text('reconstruct.inForceHelp'), text: figure },
   {

@@ -21,6 +21,8 @@ const SMALL_POWER = 4;
 /** Value of the extra option in the list of a parameter that accepts a number as well as its named choices. */
 const NUMBER = 'number';
 
+/** Significant digits of a chosen value: more would not fit into its field. */
+const CHOSEN_DIGITS = 3;
 /** Value of a numeric parameter that the method chooses. */
 const AUTO = 'auto';
 
@@ -174,7 +176,7 @@ function automatic(spec: ParamSpec, onChange: (value: unknown) => void): Input {
     tick.checked = isAuto;
     // Before there is a value to start from, there is none to switch to.
     tick.disabled = isAuto && chosen === undefined;
-    if (isAuto) show(chosen ?? '');
+    if (isAuto) show(chosen === undefined ? '' : Number(chosen.toPrecision(CHOSEN_DIGITS)));
   };
   tick.addEventListener('change', () => onChange(tick.checked ? AUTO : chosen));
   const row = h('label', { class: 'check automatic' }, tick, text('controls.automatic'));
