@@ -647,6 +647,21 @@ fn far_outliers_that_are_kept_give_a_warning() {
     }
 }
 
+#[test]
+fn a_system_that_far_outliers_make_singular_is_refused_by_name() {
+    let points = [noisy(torus, 3000, 0.02, 1), vec![Vec3::X * 900.0]].concat();
+    let (kernel, lambda_surface) = (KernelKind::Gaussian, Auto::Given(0.0));
+    let params = ImplicitParams { kernel, lambda_surface, sigma: 1.0, ..ImplicitParams::default() };
+    let mut surface = begun(points, params);
+    let failure = loop {
+        match surface.step() {
+            Ok(report) => assert!(!report.done),
+            Err(failure) => break failure.to_string(),
+        }
+    };
+    assert!(failure.contains("keepComponents"), "{failure}");
+}
+
 /// States of six points before the first step, from before there was the parameter `sides`.
 #[test]
 fn states_without_sides_are_restored() {

@@ -351,12 +351,15 @@ impl ImplicitSurface {
                      noise; components, handles and volume may be wrong";
         let outliers = "a few points are so far away that the others are a small part of the box: cells are too large for the \
                         object, and there may be no surface; keep only the largest cluster of points, or remove those points";
-        let has_outliers = self.samples.as_ref().is_some_and(|samples| samples.has_far_outliers);
         let found = [
-            (has_outliers, WarningCode::Outliers, outliers),
+            (self.has_far_outliers(), WarningCode::Outliers, outliers),
             (self.ambiguous_sides && self.is_two_sided(), WarningCode::ThinParts, sides),
         ];
         found.into_iter().filter(|one| one.0).map(|(_, code, text)| Warning::new(code, text)).collect()
+    }
+
+    fn has_far_outliers(&self) -> bool {
+        self.samples.as_ref().is_some_and(|samples| samples.has_far_outliers)
     }
 
     fn subsample(&mut self, mut sampling: Box<Sampling>) -> Result<Stage, MethodError> {
@@ -511,7 +514,10 @@ impl ImplicitSurface {
     /// Returns the error of a failed solve, and discards its linear system, so that later edits do not revise it.
     fn singular(&mut self) -> MethodError {
         (self.base_edits, self.solver) = (None, None);
-        let cause = if self.params.lambda_surface == Auto::Given(0.0) {
+        let cause = if self.has_far_outliers() {
+            "a few points are so far away that the others nearly coincide in the box; discard outliers with keepComponents, \
+             or remove them"
+        } else if self.params.lambda_surface == Auto::Given(0.0) {
             "lambdaSurface is 0 and some points are too close together; set it above 0"
         } else {
             "rounding errors exceed the tolerance; use a larger tolerance or lambda, or a narrower kernel"
