@@ -7,6 +7,8 @@ export const FEW = 3000;
 export const MANY = 20_000;
 /** Extraction cell: a 128th of the box of side 2 that contains the torus. */
 const CELL = 2 / 128;
+/** The paper's settings, which give other packages the same points and values to solve for. */
+const PARAMS = { delta: 5, lambdaSurface: 0.001, lambdaExterior: 2, sides: 'outside', cell: CELL };
 const [RING, TUBE] = [0.65, 0.35];
 
 /** Returns uniformly distributed points of a torus as packed xyz. */
@@ -38,7 +40,7 @@ function phases(surface) {
 /** Returns constraints, and the vertices of the resulting surface, as input for other packages. */
 export async function example(count) {
   await init();
-  const surface = new ImplicitSurface({ points: torus(count), params: { cell: CELL } });
+  const surface = new ImplicitSurface({ points: torus(count), params: PARAMS });
   phases(surface);
   const { surface: points, exterior } = surface.constraints();
   const { positions: vertices } = surface.mesh.arrays();
@@ -48,7 +50,7 @@ export async function example(count) {
 
 /** Reconstructs a surface from its points, then again with one point added by hand. */
 function wholeRun(count) {
-  const surface = new ImplicitSurface({ points: torus(count), params: { cell: CELL } });
+  const surface = new ImplicitSurface({ points: torus(count), params: PARAMS });
   try {
     const { times, report } = phases(surface);
     const { residual, vertices, components, euler } = report;

@@ -20,7 +20,7 @@ export interface ImplicitParams {
   kernel?: 'multi-order' | 'thin-plate' | 'biharmonic' | 'gaussian';
   /**
    * First-order smoothness of the multi-order kernel, δ, per unit of length of the normalised box (longest side 2):
-   * larger values give a tighter surface. `'auto'` chooses it by the density of the points.
+   * larger values give a tighter surface. `'auto'`, the default, chooses it by the density of the points; 5 is the paper's.
    */
   delta?: number | 'auto';
   /**
@@ -32,15 +32,13 @@ export interface ImplicitParams {
   sigma?: number;
   /**
    * Regularisation λ of surface constraints (points where the implicit function f is to be 0): how much each may be
-   * missed; 0 interpolates. With n > 3,000 points it is multiplied by n/3,000. `'auto'` chooses it by the density and the
-   * noise of the points.
+   * missed; 0 interpolates. With n > 3,000 points it is multiplied by n/3,000. `'auto'`, the default, chooses it by the
+   * density and the noise of the points; 0.001 is the paper's.
    */
   lambdaSurface?: number | 'auto';
   /**
-   * Regularisation λ of exterior constraints (points where the implicit function f is to be −1): how much each may be
-   * missed. `'auto'` places constraints on both sides of the surface, 1 inside and −1 outside, instead of outside only, and
-   * chooses it by density and noise; not with cameras, or exterior points that are given. Noise then does not shrink the
-   * surface, and parts that no point supports are left out.
+   * Regularisation λ of constraints off the surface (points where the implicit function f is to be −1 or 1): how much each
+   * may be missed. `'auto'`, the default, chooses it by density and noise; 2 is the paper's.
    */
   lambdaExterior?: number | 'auto';
   /** Relative residual at which the iterative solver of the linear system for f stops. */
@@ -55,6 +53,12 @@ export interface ImplicitParams {
    * surface constraints.
    */
   level?: 'zero' | 'mean';
+  /**
+   * Sides of the surface with constraints: `'both'`, the default, −1 outside and 1 inside, so that noise does not shrink the
+   * surface, and parts that no point supports are left out; or `'outside'`, the paper's. Where cameras or exterior points are
+   * given, these say which side is outside.
+   */
+  sides?: 'both' | 'outside';
 }
 
 /** Measures of points, and the values that an implicit surface chose by them, in units of the normalised box. */
@@ -63,7 +67,7 @@ export interface ImplicitChoice {
   noise: number;
   /** Number of points on a unit of area. */
   density: number;
-  /** The value of `lambdaSurface` if that is `'auto'`; not multiplied for many points. */
+  /** The value of `lambdaSurface` if that is `'auto'`; given as a number, it has the same effect. */
   lambdaSurface: number;
   /** That of `lambdaExterior`. */
   lambdaExterior: number;
@@ -112,7 +116,10 @@ export interface ImplicitOptions {
   cameras?: Camera[];
   /** Largest number of points used; more are reduced to a Poisson-disc subsample. 4 to 100,000, default 20,000. */
   maxPoints?: number;
-  /** Removes outliers: keeps only the n largest connected clusters of points; default all. */
+  /**
+   * Removes outliers: keeps only the n largest connected clusters of points; default all. If these are less than half as long
+   * as all points, the normalised box is theirs.
+   */
   keepComponents?: number;
   /** Initial parameters: any subset; the others have their defaults. */
   params?: ImplicitParams;
@@ -138,11 +145,11 @@ export interface PointEdits {
  * by {@link ImplicitSurface.fitness}.
  */
 export interface Fitness {
-  /** Mean distance of the points, as edited, from the surface, in the points' units. */
+  /** Mean distance of the points, as edited and without outliers, from the surface, in the points' units. */
   mean: number;
-  /** Root mean square distance of the points, as edited, from the surface, in the points' units. */
+  /** Root mean square distance of these points from the surface, in the points' units. */
   rms: number;
-  /** Largest distance of a point, as edited, from the surface, in the points' units. */
+  /** Largest distance of one of these points from the surface, in the points' units. */
   max: number;
   /** Mean of the absolute mean curvature |H| over the vertices of the surface, per unit of length of the points. */
   meanCurvature: number;
@@ -156,6 +163,7 @@ interface Statistics {
   cell: number;
   spacing: number;
   duplicates: number;
+  outliers: number;
   spuriousComponents: number;
   choice?: ImplicitChoice;
   warning?: string;
@@ -238,6 +246,11 @@ export class ImplicitSurface implements Stepper {
   /** Number of input points left out as duplicates of others. */
   get duplicates(): number {
     return this.#statistics().duplicates;
+  }
+
+  /** Number of different points in none of the clusters that `keepComponents` keeps; 0 until the constraints are chosen. */
+  get outliers(): number {
+    return this.#statistics().outliers;
   }
 
   /** Number of spurious components of the last surface: connected components with no surface constraint near. */
@@ -347,7 +360,7 @@ export class ImplicitSurface implements Stepper {
 
   /**
    * Returns the surface constraints (the points used), the exterior constraints and those inside, of which there are only
-   * with `lambdaExterior: 'auto'`, packed; empty until they are chosen. In double precision where the points need it.
+   * with `sides: 'both'`, packed; empty until they are chosen. In double precision where the points need it.
    */
   constraints(): { surface: PointArray; exterior: PointArray; interior: PointArray } {
     const [surface, exterior, interior] = this.#handle.use((raw) => [0, 1, 2].map((kind) => raw.constraints(kind)));

@@ -152,6 +152,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     cell: 'value',
     spacing: 'value',
     duplicates: 'value',
+    outliers: 'value',
     choice: 'value',
     spuriousComponents: 'value',
     warning: 'value',

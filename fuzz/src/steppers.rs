@@ -8,7 +8,7 @@ use vesicle::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Seeding, Start,
 };
 use vesicle::methods::implicit::{
-    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits,
+    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits, Sides,
 };
 use vesicle::methods::multires::{
     ControlEllipsoid, Energy, MultiresOptions, MultiresParams, MultiresolutionModel, Topology,
@@ -290,6 +290,7 @@ fn implicit_params(bytes: &mut Choices, size: f64) -> ImplicitParams {
         } else {
             ImplicitParams::default().kernel
         },
+        sides: bytes.one_of(&[Sides::Both, Sides::Outside]),
     }
 }
 
@@ -463,7 +464,7 @@ pub fn small_deformable() -> DeformableModel {
 /// Returns a fixed implicit surface of six points, for the target of its saved states.
 pub fn small_implicit() -> ImplicitSurface {
     let points = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
-    let params = ImplicitParams { cell: 0.5, ..ImplicitParams::default() };
+    let params = ImplicitParams { cell: 0.5, ..ImplicitParams::paper() };
     let options = ImplicitOptions { params, ..ImplicitOptions::default() };
     ImplicitSurface::new(Cloud { points, ..Cloud::default() }, options).unwrap()
 }

@@ -174,7 +174,7 @@ impl RawImplicit {
     }
 
     /// Returns further results: the edge of an extraction cell in world units, the mean spacing of the surface
-    /// constraints in units of the normalised box, the numbers of duplicate points and of spurious components, what
+    /// constraints in units of the normalised box, the numbers of duplicate points, outliers and spurious components, what
     /// was chosen from the points, and a warning about the parameters if there is one.
     pub fn statistics(&self) -> Result<JsValue, JsValue> {
         let surface = self.0.borrow();
@@ -182,6 +182,7 @@ impl RawImplicit {
             cell: surface.cell(),
             spacing: surface.spacing(),
             duplicates: surface.duplicates(),
+            outliers: surface.outliers(),
             spurious_components: surface.spurious_components(),
             choice: surface.choice().copied(),
             warning: surface.params().warning(),
@@ -205,6 +206,7 @@ struct Statistics {
     cell: f64,
     spacing: f64,
     duplicates: usize,
+    outliers: usize,
     spurious_components: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     choice: Option<Choice>,

@@ -361,8 +361,9 @@ describe('files', () => {
       if (lab) watch.observe(lab, { attributeFilter: ['data-state'] });
     });
     await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
-    expect(await app.page.inputValue('[data-param=lambdaSurface] input[type=number]')).toBe('0.001');
-    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz');
+    expect(await app.page.isChecked('[data-param=lambdaSurface] .automatic input')).toBe(true);
+    expect(await app.page.inputValue('[data-param=lambdaSurface] input[type=number]')).toMatch(/^0\.00\d+$/);
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz&v=2');
   });
 
   test.each([
@@ -391,10 +392,12 @@ describe('files', () => {
       await openAt('#reconstruct?p.lambdaSurface=0.002', 'done');
       await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
       expect(await measured()).toMatchObject({ components: 2 });
-      expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz');
+      expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz&v=2');
       await afterRun(app.page, () => setParam('lambdaSurface', '0.003'));
       await afterRun(app.page, () => drop(app.page, [{ name: 'again.xyz', bytes: asText('two balls') }]));
-      expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=again.xyz&p.lambdaSurface=0.003');
+      expect(await app.page.evaluate(() => location.hash)).toBe(
+        '#reconstruct?file=again.xyz&p.lambdaSurface=0.003&v=2',
+      );
     },
   );
 
@@ -402,18 +405,56 @@ describe('files', () => {
     await openAt('#reconstruct?file=balls.xyz&p.delta=9', 'done');
     expect(await text('.banner')).toContain('Open balls.xyz from your disk');
     await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
-    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz&p.delta=9');
-    expect(await measured()).toMatchObject({ components: 2 });
+    // It is from before parameters were chosen from the points, and relies on the values of then.
+    expect(await app.page.evaluate(() => location.hash)).toBe(
+      '#reconstruct?file=balls.xyz&p.delta=9&p.lambdaSurface=0.001&p.lambdaExterior=2&p.sides=outside&v=2',
+    );
+    expect(await measured()).toMatchObject({ components: 2, delta: 9, interiorConstraints: 0 });
+  });
+
+  test('parameters of a dropped file are chosen, shown, and may be set from there', LONG, async () => {
+    await openAt('#reconstruct?file=balls.xyz&v=2', 'done');
+    await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
+    const automatic = await measured();
+    expect(automatic).toMatchObject({ components: 2, outliers: 0 });
+    expect(automatic.interiorConstraints).toBeGreaterThan(100);
+    for (const name of ['noise', 'delta', 'lambdaSurface', 'lambdaExterior'])
+      expect(automatic[name], name).toBeGreaterThan(0);
+    const tick = app.page.locator('[data-param=lambdaSurface] .automatic input');
+    const field = app.page.locator('[data-param=lambdaSurface] input[type=number]');
+    expect(await tick.isChecked()).toBe(true);
+    expect(Number(await field.inputValue()) / Number(automatic.lambdaSurface)).toBeCloseTo(1, 2);
+    await afterRun(app.page, () => tick.uncheck());
+    expect(await measured()).toEqual(automatic);
+    expect(await app.page.evaluate(() => location.hash)).toContain('p.lambdaSurface=0.00');
+    await afterRun(app.page, () => setParam('lambdaSurface', '0.05'));
+    expect(await measured()).toMatchObject({ lambdaSurface: 0.05, delta: automatic.delta });
+    await afterRun(app.page, () => tick.check());
+    expect(await measured()).toEqual(automatic);
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?file=balls.xyz&v=2');
+  });
+
+  test('a far outlier gives a warning, and keeping the largest cluster discards it', LONG, async () => {
+    await openAt('#reconstruct?file=torus.xyz&v=2', 'done');
+    const far = new Uint8Array([...asText('torus'), ...new TextEncoder().encode('900 0 0\n')]);
+    await afterRun(app.page, () => drop(app.page, [{ name: 'torus.xyz', bytes: far }]));
+    expect(await text('[data-warning-list]')).toContain('a few points are so far away');
+    await afterRun(app.page, () => setParam('keepComponents', '1'));
+    expect(await measured()).toMatchObject({ components: 1, genus: 1, outliers: 1 });
+    expect(Number((await measured()).fitMax)).toBeLessThan(0.2);
+    expect(await app.page.getAttribute('[data-warning-list]', 'data-warning-list')).toBe('[]');
   });
 
   test('points given twice count once', LONG, async () => {
+    await openAt('#reconstruct?file=twice.xyz&v=2', 'done');
     const points = asText('two balls');
     const twice = new Uint8Array([...points, ...points]);
     await afterRun(app.page, () => drop(app.page, [{ name: 'twice.xyz', bytes: twice }]));
     expect(await measured()).toMatchObject({ components: 2, duplicates: 1600, surfaceConstraints: 1600 });
   });
 
-  test('four points give no surface, and the lab says what may help', async () => {
+  test('four points give no surface with the settings of the paper, and the lab says what may help', async () => {
+    await openAt('#reconstruct?file=four.xyz', 'done');
     const bytes = new TextEncoder().encode('0 0 0\n1 0 0\n0 1 0\n0 0 1\n');
     await drop(app.page, [{ name: 'four.xyz', bytes }]);
     await expect

@@ -5,6 +5,7 @@ import { apply } from '../../www/src/finish/code';
 import type { Edit } from '../../www/src/finish/protocol';
 import { uniform } from '../../www/src/random';
 import type { CameraView, CloudSource, Edits, ParamValues, Requests, Setup } from '../../www/src/reconstruct/protocol';
+import { literal } from '../../www/src/worker/literal';
 import { asText, ballPoints, FAR } from './far';
 import { pickFrom, programsIn } from './run-code';
 import { startWorker } from './worker-in-node';
@@ -97,6 +98,18 @@ test('the code of a survey far from the origin, with points added by hand, gives
   await programs.expectSame([surface], [{ name: 'survey.xyz', bytes: asText(ballPoints(FAR, 5, 1)) }]);
   const { centroid } = Mesh.parse(surface).info();
   expect(Math.hypot(...centroid.map((value, axis) => value - (FAR[axis] ?? 0)))).toBeLessThan(0.1);
+});
+
+test('the code says what was chosen from the points', async () => {
+  await worker.request('load', { source: { shape: 'two balls' }, cameras: [], setup: SETUP });
+  await worker.request('step', { count: 10_000 });
+  expect((await code()).code).toMatch(/^\/\/ Chosen .*noise [\d.e-]+, delta [\d.]+, lambdaSurface [\d.e-]+/m);
+  const paper = { delta: 5, lambdaSurface: 0.001, lambdaExterior: 2, sides: 'outside' };
+  await worker.request('rebuild', { ...SETUP, params: paper });
+  await worker.request('step', { count: 10_000 });
+  const plain = (await code()).code;
+  expect(plain).not.toContain('Chosen');
+  for (const [name, value] of Object.entries(paper)) expect(plain).toContain(`${name}: ${literal(value)}`);
 });
 
 test('the code has cameras, and says that it lacks their pictures', async () => {

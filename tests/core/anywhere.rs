@@ -167,7 +167,7 @@ fn reconstructed(placement: Placement) -> Result<TriangleMesh, String> {
     let all = (0..150).map(|_| placement.of(points::direction(&mut random) * 2.0 + DVec3::splat(3.0)));
     let (points, origin) = all.collect::<WorldPositions>().relative();
     let options = ImplicitOptions {
-        params: ImplicitParams { cell: 0.35 * placement.scale, ..Default::default() },
+        params: ImplicitParams { cell: 0.35 * placement.scale, ..ImplicitParams::paper() },
         ..Default::default()
     };
     let mut surface =

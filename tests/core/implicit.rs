@@ -6,10 +6,11 @@ use super::common::{Random, euler_of_parts, fingerprint};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{TriangleMesh, curvature, measure, report};
 use vesicle::methods::implicit::{
-    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits,
+    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits, Sides,
 };
 use vesicle::methods::{Auto, MethodError, Parameters, StepReport};
 use vesicle::volume::marching_cubes_world;
+use vesicle::warning::WarningCode;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -27,12 +28,17 @@ fn finish(surface: &mut ImplicitSurface) -> StepReport {
     panic!("no end")
 }
 
+/// Returns options with the settings of the paper, whose constraints are outside only.
+fn paper() -> ImplicitOptions {
+    ImplicitOptions { params: ImplicitParams::paper(), ..ImplicitOptions::default() }
+}
+
 fn of_points(points: Vec<Vec3>) -> Cloud {
     Cloud { points, ..Cloud::default() }
 }
 
 fn begun(points: Vec<Vec3>, params: ImplicitParams) -> ImplicitSurface {
-    ImplicitSurface::new(of_points(points), ImplicitOptions { params, ..ImplicitOptions::default() }).unwrap()
+    ImplicitSurface::new(of_points(points), ImplicitOptions { params, ..paper() }).unwrap()
 }
 
 fn finished(points: Vec<Vec3>, params: ImplicitParams) -> ImplicitSurface {
@@ -80,7 +86,7 @@ fn refused(result: Result<impl Sized, MethodError>) -> &'static str {
 /// square of the point spacing.
 fn comes_out(shape: Shape, euler: &[i64], noise: f64, mean: f64, largest: f64) {
     let [mean, largest] = [mean, largest].map(|bound| bound * 3000.0 / MANY as f64);
-    let surface = finished(noisy(shape, MANY, noise, 7), ImplicitParams::default());
+    let surface = finished(noisy(shape, MANY, noise, 7), ImplicitParams::paper());
     sound(surface.surface());
     let found = errors(shape, surface.surface());
     println!(
@@ -130,7 +136,7 @@ fn few_points_are_enough() {
     for (name, shape, fewest, euler) in shapes {
         for count in [fewest, 2 * fewest] {
             for seed in 0..5 {
-                let surface = finished(noisy(shape, count, 0.0, seed), ImplicitParams::default());
+                let surface = finished(noisy(shape, count, 0.0, seed), ImplicitParams::paper());
                 sound(surface.surface());
                 let found = euler_of_parts(surface.surface());
                 assert_eq!(found, euler, "{name}, {count} points, seed {seed}");
@@ -143,7 +149,7 @@ fn few_points_are_enough() {
 #[test]
 #[ignore = "long: npm run test:all"]
 fn twenty_thousand_noisy_points_of_a_torus() {
-    let surface = finished(noisy(torus, 20_000, 0.01, 7), ImplicitParams::default());
+    let surface = finished(noisy(torus, 20_000, 0.01, 7), ImplicitParams::paper());
     sound(surface.surface());
     let found = errors(torus, surface.surface());
     println!("mean {:.5}, largest {:.5}", found[0], found[1]);
@@ -155,7 +161,7 @@ fn twenty_thousand_noisy_points_of_a_torus() {
 fn without_regularization_the_surface_passes_through_the_points() {
     let points = noisy(blend, 800, 0.0, 3);
     let params =
-        ImplicitParams { lambda_surface: Auto::Given(0.0), tolerance: 1e-8, ..ImplicitParams::default() };
+        ImplicitParams { lambda_surface: Auto::Given(0.0), tolerance: 1e-8, ..ImplicitParams::paper() };
     let surface = finished(points.clone(), params);
     let values = surface.evaluate(&points).unwrap();
     let most = values.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
@@ -172,14 +178,14 @@ fn without_regularization_the_surface_passes_through_the_points() {
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn more_regularization_smooths_noisy_points() {
     let points = noisy(sphere, 1000, 0.01, 5);
-    let mut surface = begun(points, ImplicitParams::default());
+    let mut surface = begun(points, ImplicitParams::paper());
     let mut curvatures = Vec::new();
     for lambda_surface in [0.0, 0.001, 0.01, 0.1] {
         surface
             .set_params(ImplicitParams {
                 lambda_surface: lambda_surface.into(),
                 level: IsoValue::Mean,
-                ..ImplicitParams::default()
+                ..ImplicitParams::paper()
             })
             .unwrap();
         finish(&mut surface);
@@ -198,7 +204,7 @@ fn more_regularization_smooths_noisy_points() {
 fn a_gap_is_closed() {
     let mut points = noisy(sphere, 2 * MANY / 3, 0.0, 9);
     points.retain(|p| p.z < 0.75);
-    let surface = finished(points, ImplicitParams::default());
+    let surface = finished(points, ImplicitParams::paper());
     sound(surface.surface());
     assert_eq!(euler_of_parts(surface.surface()), [2]);
     let found = errors(sphere, surface.surface());
@@ -209,9 +215,9 @@ fn a_gap_is_closed() {
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn the_mean_level_passes_nearer_to_the_points() {
-    let mut surface = finished(noisy(sphere, 1000, 0.0, 1), ImplicitParams::default());
+    let mut surface = finished(noisy(sphere, 1000, 0.0, 1), ImplicitParams::paper());
     let (zero, volume) = (surface.fitness().unwrap().mean, measure(surface.surface()).volume);
-    surface.set_params(ImplicitParams { level: IsoValue::Mean, ..ImplicitParams::default() }).unwrap();
+    surface.set_params(ImplicitParams { level: IsoValue::Mean, ..ImplicitParams::paper() }).unwrap();
     finish(&mut surface);
     println!("{zero} and {}", surface.fitness().unwrap().mean);
     assert!(surface.fitness().unwrap().mean < zero);
@@ -223,19 +229,19 @@ fn the_mean_level_passes_nearer_to_the_points() {
 fn changed_parameters_give_the_result_of_a_new_surface() {
     let points = noisy(torus, 500, 0.005, 2);
     let changes = [
-        ImplicitParams { delta: Auto::Given(10.0), tau: 0.01, ..ImplicitParams::default() },
-        ImplicitParams { delta: Auto::Given(10.0), tau: 0.01, cell: 0.03, ..ImplicitParams::default() },
+        ImplicitParams { delta: Auto::Given(10.0), tau: 0.01, ..ImplicitParams::paper() },
+        ImplicitParams { delta: Auto::Given(10.0), tau: 0.01, cell: 0.03, ..ImplicitParams::paper() },
         ImplicitParams {
             lambda_surface: Auto::Given(0.0),
             lambda_exterior: Auto::Given(0.5),
             cell: 0.03,
-            ..ImplicitParams::default()
+            ..ImplicitParams::paper()
         },
-        ImplicitParams { kernel: KernelKind::ThinPlate, level: IsoValue::Mean, ..ImplicitParams::default() },
-        ImplicitParams { kernel: KernelKind::Biharmonic, tolerance: 1e-8, ..ImplicitParams::default() },
-        ImplicitParams { kernel: KernelKind::Gaussian, sigma: 0.2, ..ImplicitParams::default() },
+        ImplicitParams { kernel: KernelKind::ThinPlate, level: IsoValue::Mean, ..ImplicitParams::paper() },
+        ImplicitParams { kernel: KernelKind::Biharmonic, tolerance: 1e-8, ..ImplicitParams::paper() },
+        ImplicitParams { kernel: KernelKind::Gaussian, sigma: 0.2, ..ImplicitParams::paper() },
     ];
-    let mut surface = finished(points.clone(), ImplicitParams::default());
+    let mut surface = finished(points.clone(), ImplicitParams::paper());
     for (k, params) in changes.into_iter().enumerate() {
         surface.set_params(params.clone()).unwrap();
         assert_eq!(*surface.params(), params);
@@ -254,10 +260,10 @@ fn changed_parameters_give_the_result_of_a_new_surface() {
 
 #[test]
 fn only_phases_that_depend_on_a_changed_parameter_run_again() {
-    let mut surface = finished(noisy(sphere, 400, 0.0, 4), ImplicitParams::default());
+    let mut surface = finished(noisy(sphere, 400, 0.0, 4), ImplicitParams::paper());
     for change in [
-        ImplicitParams { cell: 0.05, ..ImplicitParams::default() },
-        ImplicitParams { cell: 0.05, level: IsoValue::Mean, ..ImplicitParams::default() },
+        ImplicitParams { cell: 0.05, ..ImplicitParams::paper() },
+        ImplicitParams { cell: 0.05, level: IsoValue::Mean, ..ImplicitParams::paper() },
     ] {
         let before = surface.surface().clone();
         surface.set_params(change.clone()).unwrap();
@@ -271,7 +277,7 @@ fn only_phases_that_depend_on_a_changed_parameter_run_again() {
         assert_eq!(surface.step().unwrap().iteration, report.iteration, "nothing to do");
     }
     surface
-        .set_params(ImplicitParams { lambda_surface: Auto::Given(0.002), ..ImplicitParams::default() })
+        .set_params(ImplicitParams { lambda_surface: Auto::Given(0.002), ..ImplicitParams::paper() })
         .unwrap();
     assert_eq!(surface.step().unwrap().phase, "solve");
 }
@@ -280,7 +286,7 @@ fn only_phases_that_depend_on_a_changed_parameter_run_again() {
 #[test]
 fn a_failure_keeps_the_surface_and_other_parameters_continue() {
     let points = noisy(sphere, 400, 0.0, 4);
-    let mut surface = finished(points, ImplicitParams::default());
+    let mut surface = finished(points, ImplicitParams::paper());
     let (before, params) = (surface.surface().clone(), surface.params().clone());
     for (name, wrong) in [
         ("cell", ImplicitParams { cell: 1e-9, ..params.clone() }),
@@ -315,7 +321,7 @@ fn an_unsolvable_system_is_reported() {
         lambda_surface: Auto::Given(0.0),
         lambda_exterior: Auto::Given(0.0),
         tolerance: 1e-12,
-        ..ImplicitParams::default()
+        ..ImplicitParams::paper()
     };
     let mut surface = begun(points, wide);
     let failed = (0..100_000).find_map(|_| match surface.step() {
@@ -325,7 +331,7 @@ fn an_unsolvable_system_is_reported() {
     let Some(MethodError::Singular { constraints, cause }) = failed else { panic!("{failed:?}") };
     assert!(constraints > 300 && cause.contains("lambdaSurface"), "{constraints}: {cause}");
     assert!(surface.surface().triangles.is_empty());
-    surface.set_params(ImplicitParams::default()).unwrap();
+    surface.set_params(ImplicitParams::paper()).unwrap();
     finish(&mut surface);
     sound(surface.surface());
 }
@@ -340,7 +346,7 @@ fn a_restored_run_continues_bit_for_bit() {
         confidence: Some(exact.iter().map(|_| random.within(0.1, 1.0) as f32).collect()),
         ..of_points(exact.iter().map(|p| p.as_vec3()).collect())
     };
-    let options = ImplicitOptions { cameras: cameras(2, 64), max_points: 400, ..ImplicitOptions::default() };
+    let options = ImplicitOptions { cameras: cameras(2, 64), max_points: 400, ..paper() };
     let begun = || ImplicitSurface::new(cloud.clone(), options.clone()).unwrap();
     let mut whole = begun();
     let last = finish(&mut whole);
@@ -371,7 +377,7 @@ fn a_restored_run_continues_bit_for_bit() {
         assert!(phases.iter().any(|found| found == phase), "{phase} of {phases:?}");
     }
     // While another solution is computed the last surface is kept, and restored as well.
-    whole.set_params(ImplicitParams { delta: Auto::Given(8.0), ..ImplicitParams::default() }).unwrap();
+    whole.set_params(ImplicitParams { delta: Auto::Given(8.0), ..ImplicitParams::paper() }).unwrap();
     (0..3).for_each(|_| drop(whole.step().unwrap()));
     let mut resumed = begun();
     resumed.restore(&whole.save()).unwrap();
@@ -399,7 +405,7 @@ fn edited() -> (Vec<Vec3>, PointEdits) {
 #[test]
 fn edits_have_the_effect_of_other_input_points() {
     let (points, edits) = edited();
-    let params = ImplicitParams { tolerance: 1e-8, ..ImplicitParams::default() };
+    let params = ImplicitParams { tolerance: 1e-8, ..ImplicitParams::paper() };
     let mut fresh = begun(points.clone(), params.clone());
     fresh.set_edits(edits.clone()).unwrap();
     let from_start = finish(&mut fresh);
@@ -439,12 +445,12 @@ fn edits_have_the_effect_of_other_input_points() {
 fn many_added_points_are_solved_from_the_start() {
     let points = noisy(torus, 900, 0.0, 4);
     let (half, rest) = points.split_at(500);
-    let mut surface = finished(half.to_vec(), ImplicitParams::default());
+    let mut surface = finished(half.to_vec(), ImplicitParams::paper());
     surface.set_edits(PointEdits { added: rest.to_vec(), ..PointEdits::default() }).unwrap();
     finish(&mut surface);
     sound(surface.surface());
     assert_eq!(surface.constraints()[0].len(), 900);
-    let [found, all] = [&surface, &finished(points, ImplicitParams::default())].map(|s| s.fitness().unwrap());
+    let [found, all] = [&surface, &finished(points, ImplicitParams::paper())].map(|s| s.fitness().unwrap());
     println!("{found:?}, all at once {all:?}");
     // Exterior points are only created from the input points.
     assert!(found.mean < 1.3 * all.mean, "{found:?}, all at once {all:?}");
@@ -457,7 +463,7 @@ fn a_dense_cluster_beside_a_ball_is_solved_with_a_narrow_gaussian() {
     let mut points = noisy(sphere, 500, 0.0, 3);
     points.extend(noisy(sphere, 500, 0.0, 4).iter().map(|p| *p * 0.01 + Vec3::Z));
     for sigma in [0.005, 0.02] {
-        let params = ImplicitParams { kernel: KernelKind::Gaussian, sigma, ..ImplicitParams::default() };
+        let params = ImplicitParams { kernel: KernelKind::Gaussian, sigma, ..ImplicitParams::paper() };
         let surface = finished(points.clone(), params);
         assert!(report(surface.surface()).unwrap().is_healthy());
         let most = surface.evaluate(&points).unwrap().iter().fold(0.0, |most: f64, f| most.max(f.abs()));
@@ -469,7 +475,7 @@ fn a_dense_cluster_beside_a_ball_is_solved_with_a_narrow_gaussian() {
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 fn points_can_be_added_far_from_the_origin() {
     let points = noisy(sphere, 3000, 0.0, 3).iter().map(|p| *p + Vec3::X * 120.0).collect();
-    let mut surface = finished(points, ImplicitParams::default());
+    let mut surface = finished(points, ImplicitParams::paper());
     surface.set_edits(PointEdits { added: vec![Vec3::X * 122.9], ..PointEdits::default() }).unwrap();
     finish(&mut surface);
     sound(surface.surface());
@@ -479,7 +485,7 @@ fn points_can_be_added_far_from_the_origin() {
 fn invalid_edits_are_refused_by_name_and_change_nothing() {
     let (points, edits) = edited();
     let on_a_point = PointEdits { exterior: vec![Vec3::X, points[7]], ..PointEdits::default() };
-    let mut surface = begun(points.clone(), ImplicitParams::default());
+    let mut surface = begun(points.clone(), ImplicitParams::paper());
     // Also before constraints were selected.
     assert_eq!(refused(surface.set_edits(on_a_point)), "exterior");
     finish(&mut surface);
@@ -509,7 +515,7 @@ fn invalid_edits_are_refused_by_name_and_change_nothing() {
 #[test]
 fn a_restored_run_continues_bit_for_bit_through_edits() {
     let (points, edits) = edited();
-    let begun = || begun(points.clone(), ImplicitParams::default());
+    let begun = || begun(points.clone(), ImplicitParams::paper());
     let mut running = begun();
     let fewer = PointEdits { removed: Vec::new(), ..edits.clone() };
     let mut steps = 0;
@@ -545,7 +551,7 @@ fn a_restored_run_continues_bit_for_bit_through_edits() {
 #[test]
 fn invalid_states_are_refused_and_change_nothing() {
     let points = noisy(sphere, 200, 0.0, 4);
-    let mut surface = finished(points.clone(), ImplicitParams::default());
+    let mut surface = finished(points.clone(), ImplicitParams::paper());
     let (state, before) = (surface.save(), surface.surface().clone());
     let mut broken =
         vec![Vec::new(), state[..20].to_vec(), state[..state.len() - 1].to_vec(), vec![7; state.len()]];
@@ -558,14 +564,14 @@ fn invalid_states_are_refused_and_change_nothing() {
     }
     let mut others = points;
     others[7].x += 0.001;
-    let foreign = begun(others, ImplicitParams::default()).save();
+    let foreign = begun(others, ImplicitParams::paper()).save();
     assert!(matches!(error(surface.restore(&foreign)), MethodError::BadState { field: "points", .. }));
     assert!(*surface.surface() == before);
 }
 
 #[test]
 fn a_sampled_volume_has_the_same_shape() {
-    let surface = finished(noisy(torus, 800, 0.0, 8), ImplicitParams::default());
+    let surface = finished(noisy(torus, 800, 0.0, 8), ImplicitParams::paper());
     let volume = surface.to_volume([70, 70, 40]).unwrap();
     let sampled = marching_cubes_world(&volume, 0.0, 0).unwrap();
     let [found, expected] = [&sampled, surface.surface()].map(measure);
@@ -581,26 +587,102 @@ fn a_sampled_volume_has_the_same_shape() {
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn fitness_of_a_ball() {
-    let surface = finished(noisy(sphere, MANY, 0.0, 1), ImplicitParams::default());
+    let surface = finished(noisy(sphere, MANY, 0.0, 1), ImplicitParams::paper());
     let found = surface.fitness().unwrap();
     let off = errors(sphere, surface.surface())[0];
     println!("{found:?}, off by {off}");
     assert!((found.mean_curvature - 1.0).abs() < 0.3);
     assert!(found.mean <= found.rms && found.rms <= found.max);
     assert!((found.mean - off).abs() < 0.002);
-    // Removed outliers count as well.
-    let mut points = noisy(sphere, 600, 0.0, 1);
-    points.push(Vec3::new(0.0, 0.0, 3.0));
-    let options = ImplicitOptions { keep_components: Some(1), ..ImplicitOptions::default() };
+}
+
+/// Reconstructs a ball of 600 points, and others, of which the largest cluster is kept.
+fn with_outliers(outliers: &[Vec3], params: ImplicitParams) -> ImplicitSurface {
+    let points = [noisy(sphere, 600, 0.0, 1), outliers.to_vec()].concat();
+    let options = ImplicitOptions { keep_components: Some(1), params, ..ImplicitOptions::default() };
     let mut surface = ImplicitSurface::new(of_points(points), options).unwrap();
-    finish(&mut surface);
+    let report = finish(&mut surface);
+    assert_eq!(report.warnings, []);
+    surface
+}
+
+#[test]
+fn discarded_outliers_are_counted_and_do_not_count_as_misfit() {
+    let surface = with_outliers(&[Vec3::Z * 3.0, Vec3::X * -2.5, Vec3::X * -2.5], ImplicitParams::paper());
+    assert_eq!((surface.outliers(), surface.duplicates()), (2, 1));
     assert_eq!(surface.constraints()[0].len(), 600);
-    assert!((surface.fitness().unwrap().max - 2.0).abs() < 0.05);
+    assert!(surface.fitness().unwrap().max < 0.05);
+}
+
+#[test]
+fn far_outliers_that_are_discarded_change_nothing() {
+    for params in [ImplicitParams::paper(), ImplicitParams::default()] {
+        let alone = with_outliers(&[], params.clone());
+        let far = [Vec3::X * 50.0, Vec3::new(0.0, -1e3, 20.0), Vec3::Z * 1e7, Vec3::Z * 1e7];
+        let surface = with_outliers(&far, params);
+        assert!(surface.surface() == alone.surface());
+        assert_eq!((surface.outliers(), surface.duplicates()), (3, 1));
+        assert_eq!(surface.fitness(), alone.fitness());
+        let mut restored = with_outliers(&far, ImplicitParams::default());
+        restored.restore(&surface.save()).unwrap();
+        assert_eq!((restored.outliers(), restored.fitness()), (3, alone.fitness()));
+    }
+}
+
+/// Other clusters that are not far are left in the box, as in the paper's figures.
+#[test]
+fn near_outliers_that_are_discarded_do_not_change_the_box() {
+    let surface = with_outliers(&[Vec3::Z * 2.5], ImplicitParams::paper());
+    let alone = with_outliers(&[], ImplicitParams::paper());
+    assert!((surface.spacing() / alone.spacing() - 2.0 / 3.5).abs() < 0.01);
+}
+
+#[test]
+fn far_outliers_that_are_kept_give_a_warning() {
+    for (distance, expected) in [(1e3, true), (50.0, true), (3.0, false)] {
+        let points = [noisy(sphere, 600, 0.0, 1), vec![Vec3::X * distance]].concat();
+        let mut surface = begun(points, ImplicitParams::paper());
+        let codes: Vec<_> = finish(&mut surface).warnings.iter().map(|warning| warning.code).collect();
+        assert_eq!(codes, if expected { vec![WarningCode::Outliers] } else { vec![] }, "{distance}");
+    }
+}
+
+#[test]
+fn a_system_that_far_outliers_make_singular_is_refused_by_name() {
+    let points = [noisy(torus, 3000, 0.02, 1), vec![Vec3::X * 900.0]].concat();
+    let (kernel, lambda_surface) = (KernelKind::Gaussian, Auto::Given(0.0));
+    let params = ImplicitParams { kernel, lambda_surface, sigma: 1.0, ..ImplicitParams::default() };
+    let mut surface = begun(points, params);
+    let failure = loop {
+        match surface.step() {
+            Ok(report) => assert!(!report.done),
+            Err(failure) => break failure.to_string(),
+        }
+    };
+    assert!(failure.contains("keepComponents"), "{failure}");
+}
+
+/// States of six points before the first step, from before there was the parameter `sides`.
+#[test]
+fn states_without_sides_are_restored() {
+    let axes = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|axis| [axis, Vec3::ZERO - axis]).collect();
+    let mut surface = begun(axes, ImplicitParams::default());
+    for (bytes, sides) in [
+        (&include_bytes!("../data/implicit-outside.state")[..], Sides::Outside),
+        (&include_bytes!("../data/implicit-both.state")[..], Sides::Both),
+    ] {
+        surface.restore(bytes).unwrap();
+        let [delta, lambda_surface] = [5.0, 0.001].map(Auto::Given);
+        let lambda_exterior = if sides == Sides::Both { Auto::Auto } else { Auto::Given(2.0) };
+        let usual = ImplicitParams::default();
+        let expected = ImplicitParams { delta, lambda_surface, lambda_exterior, sides, ..usual };
+        assert_eq!(*surface.params(), expected);
+    }
 }
 
 #[test]
 fn values_and_gradients_of_the_function() {
-    let surface = finished(noisy(sphere, 500, 0.0, 1), ImplicitParams::default());
+    let surface = finished(noisy(sphere, 500, 0.0, 1), ImplicitParams::paper());
     assert!(surface.evaluate(&[Vec3::ZERO]).unwrap()[0] > 0.0);
     assert!(surface.evaluate(&[Vec3::new(1.2, 0.0, 0.0)]).unwrap()[0] < 0.0);
     for p in [Vec3::new(0.9, 0.2, 0.1), Vec3::new(0.0, -1.1, 0.3)] {
@@ -620,7 +702,7 @@ fn colours_of_points_are_interpolated() {
     let points = noisy(sphere, 600, 0.0, 1);
     let color = |p: Vec3| if p.z > 0.0 { Vec3::X } else { Vec3::Y };
     let cloud = Cloud { colors: Some(points.iter().map(|&p| color(p)).collect()), ..of_points(points) };
-    let mut surface = ImplicitSurface::new(cloud, ImplicitOptions::default()).unwrap();
+    let mut surface = ImplicitSurface::new(cloud, paper()).unwrap();
     finish(&mut surface);
     let mesh = surface.surface();
     let colors = mesh.colors.as_ref().unwrap();
@@ -628,7 +710,7 @@ fn colours_of_points_are_interpolated() {
     let away = mesh.positions.iter().zip(colors).filter(|(p, _)| p.z.abs() > 0.3);
     let off = away.map(|(&p, c)| c.distance(color(p))).fold(0.0, f32::max);
     assert!(off < 1e-3, "{off}");
-    assert_eq!(finished(noisy(sphere, 50, 0.0, 1), ImplicitParams::default()).surface().colors, None);
+    assert_eq!(finished(noisy(sphere, 50, 0.0, 1), ImplicitParams::paper()).surface().colors, None);
 }
 
 /// Returns cameras around the z axis at a distance of five, facing the origin, each with an image of one colour.
@@ -653,7 +735,7 @@ fn cameras(count: u8, size: u32) -> Vec<Camera> {
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn cameras_determine_exterior_points_and_colours() {
-    let options = ImplicitOptions { cameras: cameras(4, 100), ..ImplicitOptions::default() };
+    let options = ImplicitOptions { cameras: cameras(4, 100), ..paper() };
     let mut surface = ImplicitSurface::new(of_points(noisy(torus, 1000, 0.003, 6)), options).unwrap();
     finish(&mut surface);
     sound(surface.surface());
@@ -672,7 +754,7 @@ fn cameras_determine_exterior_points_and_colours() {
 #[test]
 fn given_exterior_points_are_used() {
     let outside = [Vec3::X * 1.5, Vec3::ZERO, Vec3::new(0.0, 0.0, 0.9)];
-    let options = ImplicitOptions { exterior: Some(outside.to_vec()), ..ImplicitOptions::default() };
+    let options = ImplicitOptions { exterior: Some(outside.to_vec()), ..paper() };
     let mut surface = ImplicitSurface::new(of_points(noisy(torus, 1000, 0.0, 6)), options.clone()).unwrap();
     finish(&mut surface);
     sound(surface.surface());
@@ -694,7 +776,7 @@ fn given_exterior_points_are_used() {
 #[test]
 fn scaled_and_shifted_points_give_the_same_shape() {
     let points = noisy(torus, 800, 0.0, 6);
-    let usual = finished(points.clone(), ImplicitParams::default());
+    let usual = finished(points.clone(), ImplicitParams::paper());
     let expected = measure(usual.surface());
     for (scale, shift) in [
         (1e-6_f32, 0.0),
@@ -707,7 +789,7 @@ fn scaled_and_shifted_points_give_the_same_shape() {
         (3e37, 0.0),
     ] {
         let placed = points.iter().map(|p| *p * scale + Vec3::splat(shift)).collect();
-        let surface = finished(placed, ImplicitParams::default());
+        let surface = finished(placed, ImplicitParams::paper());
         sound(surface.surface());
         let found = measure(surface.surface());
         let unit = f64::from(scale);
@@ -725,7 +807,7 @@ fn scaled_and_shifted_points_give_the_same_shape() {
 fn far_from_the_origin_cells_are_coarser() {
     for shift in [100.0_f32, 450.0] {
         let placed = noisy(torus, 800, 0.0, 6).iter().map(|p| *p + Vec3::splat(shift)).collect();
-        let surface = finished(placed, ImplicitParams::default());
+        let surface = finished(placed, ImplicitParams::paper());
         sound(surface.surface());
         assert_eq!(euler_of_parts(surface.surface()), [0], "{shift}");
         let off = |p: &Vec3| distance(torus, (*p - Vec3::splat(shift)).as_dvec3()).abs();
@@ -737,7 +819,7 @@ fn far_from_the_origin_cells_are_coarser() {
 #[test]
 fn invalid_points_and_options_are_refused_by_name() {
     let points = noisy(sphere, 50, 0.0, 4);
-    let options = ImplicitOptions::default;
+    let options = paper;
     let new = |cloud: Cloud, options: ImplicitOptions| ImplicitSurface::new(cloud, options);
     let mut missing = points.clone();
     missing[3].y = f32::NAN;
@@ -786,7 +868,7 @@ fn invalid_points_and_options_are_refused_by_name() {
 
 #[test]
 fn invalid_parameters_are_refused_by_name() {
-    let usual = ImplicitParams::default;
+    let usual = ImplicitParams::paper;
     let all = [
         ("delta", ImplicitParams { delta: Auto::Given(0.0), ..usual() }),
         ("delta", ImplicitParams { delta: Auto::Given(-5.0), ..usual() }),
@@ -806,12 +888,12 @@ fn invalid_parameters_are_refused_by_name() {
     let points = noisy(sphere, 50, 0.0, 4);
     let mut surface = begun(points.clone(), usual());
     for (name, params) in all {
-        let options = ImplicitOptions { params: params.clone(), ..ImplicitOptions::default() };
+        let options = ImplicitOptions { params: params.clone(), ..paper() };
         assert_eq!(refused(ImplicitSurface::new(of_points(points.clone()), options)), name);
         assert_eq!(refused(surface.set_params(params)), name);
         assert_eq!(*surface.params(), usual());
     }
-    assert_eq!(ImplicitParams::specs().len(), 9);
+    assert_eq!(ImplicitParams::specs().len(), 10);
     for delta in [24.9, 25.0, 40.0] {
         assert_eq!(
             ImplicitParams { delta: Auto::Given(delta), ..usual() }.warning().is_some(),
@@ -826,7 +908,7 @@ fn invalid_parameters_are_refused_by_name() {
 
 #[test]
 fn results_requested_too_early_are_refused() {
-    let mut surface = begun(noisy(sphere, 50, 0.0, 4), ImplicitParams::default());
+    let mut surface = begun(noisy(sphere, 50, 0.0, 4), ImplicitParams::paper());
     assert_eq!(refused(surface.evaluate(&[Vec3::ZERO])), "evaluate");
     assert_eq!(refused(surface.gradient(&[Vec3::ZERO])), "gradient");
     assert_eq!(refused(surface.to_volume([9; 3])), "toVolume");
@@ -841,9 +923,9 @@ fn results_requested_too_early_are_refused() {
 #[test]
 fn equal_points_are_merged_and_counted() {
     let mut points = noisy(sphere, 300, 0.0, 4);
-    let once = finished(points.clone(), ImplicitParams::default());
+    let once = finished(points.clone(), ImplicitParams::paper());
     points.extend_from_within(10..30);
-    let twice = finished(points, ImplicitParams::default());
+    let twice = finished(points, ImplicitParams::paper());
     assert_eq!((once.duplicates(), twice.duplicates()), (0, 20));
     assert!(once.surface() == twice.surface());
     assert_eq!(once.fitness().unwrap().max, twice.fitness().unwrap().max);
@@ -861,7 +943,7 @@ fn points_that_differ_by_rounding_are_solved() {
             let flat = libm::sinf(up);
             Vec3::new(flat * libm::cosf(around), flat * libm::sinf(around), libm::cosf(up)) + shift
         };
-        let surface = finished((0..24 * 13).map(place).collect(), ImplicitParams::default());
+        let surface = finished((0..24 * 13).map(place).collect(), ImplicitParams::paper());
         sound(surface.surface());
         assert_eq!(euler_of_parts(surface.surface()), [2]);
     }
@@ -869,7 +951,7 @@ fn points_that_differ_by_rounding_are_solved() {
     let mut points = noisy(sphere, 100, 0.0, 4);
     points.iter_mut().for_each(|p| *p += Vec3::X);
     points.extend([Vec3::ZERO, Vec3::X * 1e-20]);
-    let surface = finished(points, ImplicitParams::default());
+    let surface = finished(points, ImplicitParams::paper());
     assert_eq!(surface.duplicates(), 1);
 }
 
@@ -891,7 +973,7 @@ fn bits_are_the_same_on_every_platform() {
             points.push(Vec3::new((x * radius) as f32, (0.8 * y * radius) as f32, (0.7 * z * radius) as f32));
         }
     }
-    let surface = finished(points, ImplicitParams { cell: 0.05, ..ImplicitParams::default() });
+    let surface = finished(points, ImplicitParams { cell: 0.05, ..ImplicitParams::paper() });
     assert_eq!(format!("{:016x}", fingerprint(&surface.surface().positions)), BUMPS_BITS);
 }
 
@@ -901,7 +983,7 @@ const BUMPS_BITS: &str = "374a46a66599111a";
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn previews_grow_during_extraction() {
-    let mut surface = begun(noisy(sphere, 300, 0.0, 4), ImplicitParams::default());
+    let mut surface = begun(noisy(sphere, 300, 0.0, 4), ImplicitParams::paper());
     let mut seen = 0;
     while !surface.step().unwrap().done {
         let now = surface.preview().unwrap().triangles.len();

@@ -63,7 +63,7 @@ fn usual() -> ImplicitParams {
         lambda_surface: Auto::Given(0.0015),
         level: IsoValue::Mean,
         cell: 0.02,
-        ..ImplicitParams::default()
+        ..ImplicitParams::paper()
     }
 }
 
@@ -127,7 +127,7 @@ fn the_accuracy_at_the_defaults_is_as_recorded() {
     let mut cases = 0;
     for (noise, known) in (0..3).flat_map(|noise| ALL.iter().map(move |known| (noise, known))) {
         let Some(bound) = known.at_defaults[noise] else { continue };
-        let error = error_of(known, noise, SEEDS[0], &ImplicitParams::default());
+        let error = error_of(known, noise, SEEDS[0], &ImplicitParams::paper());
         let [usual, best] = known.poisson[noise].map(|poisson| error / poisson);
         println!(
             "{}, noise {}, defaults: {error:.6}, of Poisson's {usual:.2} (depth 8), {best:.2} (best depth)",

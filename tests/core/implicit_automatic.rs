@@ -11,14 +11,14 @@ use vesicle::warning::WarningCode;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
-fn automatic() -> ImplicitParams {
-    let [delta, lambda_surface, lambda_exterior] = [Auto::Auto; 3];
-    ImplicitParams { delta, lambda_surface, lambda_exterior, ..ImplicitParams::default() }
+fn begun(cloud: Cloud) -> ImplicitSurface {
+    ImplicitSurface::new(cloud, ImplicitOptions::default()).unwrap()
 }
 
-fn begun(cloud: Cloud) -> ImplicitSurface {
-    ImplicitSurface::new(cloud, ImplicitOptions { params: automatic(), ..ImplicitOptions::default() })
-        .unwrap()
+/// Begins with the settings of the paper.
+fn begun_on_paper(cloud: Cloud) -> ImplicitSurface {
+    let options = ImplicitOptions { params: ImplicitParams::paper(), ..ImplicitOptions::default() };
+    ImplicitSurface::new(cloud, options).unwrap()
 }
 
 fn finish(surface: &mut ImplicitSurface) {
@@ -138,37 +138,107 @@ fn normals_that_are_given_decide_the_side() {
     assert!(surface.evaluate(&[Vec3::ZERO]).unwrap()[0] < 0.0);
 }
 
+/// Returns points far from a torus, on the outside.
+fn around_torus(side: f32) -> Vec<Vec3> {
+    let shell = |p: &Vec3| {
+        let ring = Vec3::new(p.x, p.y, 0.0).normalize() * 0.7;
+        ring + (p - ring) * side
+    };
+    noisy(torus, 300, 0.0, 9).iter().map(shell).collect()
+}
+
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn points_known_to_be_outside_do_not_let_noise_shrink_the_surface() {
+    let known = |exterior: Vec<Vec3>| {
+        let cloud = Cloud { points: noisy(torus, 3000, 0.02, 1), ..Cloud::default() };
+        let options = ImplicitOptions { exterior: Some(exterior), ..ImplicitOptions::default() };
+        let mut surface = ImplicitSurface::new(cloud, options).unwrap();
+        loop {
+            let report = surface.step().unwrap();
+            if report.done {
+                return (surface, !report.warnings.is_empty());
+            }
+        }
+    };
+    let (surface, has_warning) = known(around_torus(1.5));
+    assert_eq!(euler_of_parts(surface.surface()), [0]);
+    let share = volume(&surface) / (2.0 * PI * PI * 0.7 * 0.09);
+    assert!((share - 1.0).abs() < 0.015 && !has_warning, "{share}");
+    // Inside and outside are exchanged where the points say so.
+    let (surface, has_warning) = known(around_torus(0.5));
+    assert!(surface.evaluate(&[Vec3::X * 0.7]).unwrap()[0] < 0.0 && !has_warning);
+    let inside = surface.constraints()[2].clone();
+    let from_ring = |p: &Vec3| p.distance(Vec3::new(p.x, p.y, 0.0).normalize() * 0.7);
+    assert!(!inside.is_empty() && inside.iter().all(|p| from_ring(p) > 0.3));
+    // If they contradict each other, there is a warning, and no point inside.
+    let (surface, has_warning) = known([around_torus(1.5), around_torus(0.5)].concat());
+    assert!(surface.constraints()[2].is_empty() && has_warning);
+}
+
+#[test]
+fn a_point_marked_as_outside_overrules_those_inside() {
+    let mut surface = finished(noisy(sphere, 600, 0.0, 3));
+    let inside = surface.constraints()[2].clone();
+    surface.set_edits(PointEdits { exterior: vec![inside[0] * 0.99], ..PointEdits::default() }).unwrap();
+    finish(&mut surface);
+    let left = surface.constraints()[2].clone();
+    assert!(!left.contains(&inside[0]) && left.len() > inside.len() / 2);
+}
+
+#[test]
+fn lambda_that_is_chosen_may_be_given_for_many_points() {
+    let choice = |params: ImplicitParams| {
+        let cloud = Cloud { points: noisy(sphere, 6000, 0.01, 3), ..Cloud::default() };
+        let options = ImplicitOptions { params, ..ImplicitOptions::default() };
+        let mut surface = ImplicitSurface::new(cloud, options).unwrap();
+        while surface.constraints()[0].is_empty() {
+            surface.step().unwrap();
+        }
+        while surface.step().unwrap().phase != "extract" {}
+        (*surface.choice().unwrap(), surface.evaluate(&[Vec3::ZERO, Vec3::X * 1.1]).unwrap())
+    };
+    let (chosen, values) = choice(ImplicitParams::default());
+    let length = 0.5 / chosen.density.sqrt() + 0.5 * chosen.noise;
+    // Half as much, as it is doubled for twice the usual number of points.
+    let expected = length * length * length * chosen.density / 4.0 / 2.0;
+    assert!((chosen.lambda_surface / expected - 1.0).abs() < 1e-9);
+    let lambda_surface = Auto::Given(chosen.lambda_surface);
+    assert_eq!(choice(ImplicitParams { lambda_surface, ..ImplicitParams::default() }), (chosen, values));
+}
+
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn the_same_settings_give_the_same_bits_however_they_are_reached() {
     let points = noisy(torus, 1200, 0.01, 5);
     let edits = PointEdits { removed: (0..40).collect(), ..PointEdits::default() };
     let direct = finished(points.clone());
-    let mut other = ImplicitSurface::new(
-        Cloud { points: points.clone(), ..Cloud::default() },
-        ImplicitOptions::default(),
-    )
-    .unwrap();
+    let mut other = begun_on_paper(Cloud { points: points.clone(), ..Cloud::default() });
     let choice = *direct.choice().unwrap();
-    let [delta, lambda_surface] = [choice.delta, choice.lambda_surface].map(Auto::Given);
-    other.set_params(ImplicitParams { delta, lambda_surface, ..automatic() }).unwrap();
+    let [delta, lambda_surface, lambda_exterior] =
+        [choice.delta, choice.lambda_surface, choice.lambda_exterior].map(Auto::Given);
+    other
+        .set_params(ImplicitParams { delta, lambda_surface, lambda_exterior, ..ImplicitParams::default() })
+        .unwrap();
     finish(&mut other);
     assert!(other.surface() == direct.surface(), "given");
-    other.set_params(ImplicitParams::default()).unwrap();
+    other.set_params(ImplicitParams::paper()).unwrap();
     for early in [false, true] {
         for _ in 0..if early { 5 } else { 100_000 } {
             if other.step().unwrap().done {
                 break;
             }
         }
-        other.set_params(automatic()).unwrap();
+        other.set_params(ImplicitParams::default()).unwrap();
         finish(&mut other);
         assert!(other.surface() == direct.surface(), "set early: {early}");
-        other.set_params(ImplicitParams { lambda_surface: Auto::Given(0.1), ..automatic() }).unwrap();
+        other
+            .set_params(ImplicitParams { lambda_surface: Auto::Given(0.1), ..ImplicitParams::default() })
+            .unwrap();
         finish(&mut other);
         assert!(other.surface() != direct.surface());
         other.set_edits(edits.clone()).unwrap();
-        other.set_params(ImplicitParams::default()).unwrap();
+        other.set_params(ImplicitParams::paper()).unwrap();
         other.set_edits(PointEdits::default()).unwrap();
     }
 }
@@ -200,17 +270,17 @@ fn settings_may_change_while_constraints_are_made() {
     let points = noisy(torus, 900, 0.01, 5);
     let cloud = || Cloud { points: points.clone(), ..Cloud::default() };
     let edits = PointEdits { removed: (0..40).collect(), ..PointEdits::default() };
-    let params = ImplicitParams { delta: Auto::Given(3.0), ..automatic() };
+    let params = ImplicitParams { delta: Auto::Given(3.0), ..ImplicitParams::default() };
     let mut direct = begun(cloud());
     direct.set_params(params.clone()).unwrap();
     direct.set_edits(edits.clone()).unwrap();
     finish(&mut direct);
     for has_surface in [false, true] {
-        let mut other = ImplicitSurface::new(cloud(), ImplicitOptions::default()).unwrap();
+        let mut other = begun_on_paper(cloud());
         if has_surface {
             finish(&mut other);
         }
-        other.set_params(automatic()).unwrap();
+        other.set_params(ImplicitParams::default()).unwrap();
         while other.step().unwrap().phase != "constraints" {}
         assert_eq!(other.step().unwrap().phase, "constraints");
         other.set_edits(edits.clone()).unwrap();

@@ -7,7 +7,7 @@ use super::common::{Named, Random, assert_at_least, seeds};
 use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{measure, report};
 use vesicle::methods::implicit::{
-    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits,
+    Camera, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits, Sides,
 };
 use vesicle::methods::{Auto, MethodError};
 #[cfg(target_arch = "wasm32")]
@@ -96,7 +96,7 @@ fn camera(random: &mut Random) -> Camera {
 fn params(random: &mut Random) -> ImplicitParams {
     let mut one_of = |values: &[f64]| values[random.below(values.len())];
     let auto = |number: f64| if number.is_nan() { Auto::Auto } else { Auto::Given(number) };
-    let usual = ImplicitParams::default();
+    let usual = ImplicitParams::paper();
     ImplicitParams {
         delta: auto(one_of(&[0.1, 1.0, 5.0, 5.0, 5.0, 20.0, 40.0, 100.0, f64::NAN])),
         tau: one_of(&[0.001, 0.01, 0.025, 0.025, 0.1, 1.0]),
@@ -112,6 +112,7 @@ fn params(random: &mut Random) -> ImplicitParams {
             2 => KernelKind::Gaussian,
             _ => usual.kernel,
         },
+        sides: if random.below(3) == 0 { Sides::Both } else { Sides::Outside },
     }
 }
 

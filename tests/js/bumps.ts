@@ -17,7 +17,8 @@ export function bumpsBits({ ImplicitSurface }: typeof Package): string {
     const radius = 1 + 2 * x * x * y * y * z * z;
     points.push(x * radius, 0.8 * y * radius, 0.7 * z * radius);
   }
-  const surface = new ImplicitSurface({ points: Float32Array.from(points), params: { cell: 0.05 } });
+  const paper = { delta: 5, lambdaSurface: 0.001, lambdaExterior: 2, sides: 'outside' } as const;
+  const surface = new ImplicitSurface({ points: Float32Array.from(points), params: { ...paper, cell: 0.05 } });
   while (!surface.step().done);
   const { positions } = surface.mesh.arrays();
   let hash = 0xcbf29ce484222325n;

@@ -1,6 +1,13 @@
 import { expect, test } from 'vitest';
 import * as vesicle from '../../pkg/index.js';
-import { type Camera, DeformableModel, ImplicitSurface, paramSpecs, parsePoints } from '../../pkg/index.js';
+import {
+  type Camera,
+  DeformableModel,
+  type ImplicitChoice,
+  ImplicitSurface,
+  paramSpecs,
+  parsePoints,
+} from '../../pkg/index.js';
 import { BUMPS_BITS, bumpsBits } from './bumps.js';
 import { failure, HEALTHY, rejection, wrong } from './helpers.js';
 
@@ -49,7 +56,7 @@ test('a ball is reconstructed', async () => {
   expect(mean).toBeLessThan(0.01);
   expect(rms).toBeGreaterThanOrEqual(mean);
   expect(max).toBeGreaterThanOrEqual(rms);
-  expect([found.duplicates, found.spuriousComponents, found.warning]).toEqual([0, 0, undefined]);
+  expect([found.duplicates, found.outliers, found.spuriousComponents, found.warning]).toEqual([0, 0, 0, undefined]);
   expect(found.spacing).toBeGreaterThan(0);
   expect(found.cell).toBeGreaterThan(0);
 });
@@ -113,7 +120,7 @@ test('edits change the surface, and are restored with a saved state', () => {
   expect(found.mesh.info().volume).toBe(volume);
   expect(found.step(100_000)).toMatchObject({ done: true, components: 1, euler: 2 });
   expect(found.mesh.check().selfIntersections).toBe(0);
-  expect(found.evaluate(Float32Array.of(0, 0, 1.12))[0]).toBeGreaterThan(0);
+  expect(found.evaluate(Float32Array.of(0, 0, 1.08))[0]).toBeGreaterThan(0);
   expect(found.constraints().surface.length / 3).toBe(before - 1);
   const other = surface();
   other.restore(found.save());
@@ -269,10 +276,12 @@ test('a system without solution is reported, and other parameters continue', () 
   expect(found.step(100_000).done).toBe(true);
 });
 
-test('what is automatic is chosen from the points, and said', async () => {
-  const automatic = { delta: 'auto', lambdaSurface: 'auto', lambdaExterior: 'auto' } as const;
-  const chosen = surface({ params: automatic });
+const PAPER = { delta: 5, lambdaSurface: 0.001, lambdaExterior: 2, sides: 'outside' } as const;
+
+test('by default, parameters are chosen from the points, and said', async () => {
+  const chosen = surface();
   expect(chosen.choice).toBeUndefined();
+  const automatic = { delta: 'auto', lambdaSurface: 'auto', lambdaExterior: 'auto', sides: 'both' };
   expect(chosen.params).toMatchObject(automatic);
   const { done } = await chosen.run();
   expect(done).toBe(true);
@@ -286,7 +295,35 @@ test('what is automatic is chosen from the points, and said', async () => {
   expect(on.length).toBe(points.length);
   expect(chosen.mesh.check()).toMatchObject(HEALTHY);
   expect(() => chosen.setParams({ delta: wrong('some') })).toThrow('delta');
+  const { noise: _, density: __, ...values } = chosen.choice as ImplicitChoice;
+  expect(bytesOf(finished({ params: values })).equals(bytesOf(chosen))).toBe(true);
+  chosen.setParams(PAPER);
+  while (!chosen.step(100).done);
+  expect(chosen.constraints().interior).toHaveLength(0);
+  expect(bytesOf(finished({ params: PAPER })).equals(bytesOf(chosen))).toBe(true);
   chosen.free();
+});
+
+test.each([20, 50, 100])('%i points on a sphere are enough for a ball', (count) => {
+  const { mesh } = finished({ points: ball(count) });
+  const { components, euler, volume } = mesh.info();
+  expect([components, euler]).toEqual([1, 2]);
+  expect(Math.abs(volume / ((4 / 3) * Math.PI) - 1)).toBeLessThan(0.1);
+});
+
+test('an outlier that is discarded changes nothing, and one that is kept gives a warning', () => {
+  const alone = finished({ keepComponents: 1 });
+  for (const far of [50, 1000, 1e6]) {
+    const all = Float32Array.from([...points, far, 0, 0, 0, far, 0]);
+    const without = finished({ points: all, keepComponents: 1 });
+    expect(without.outliers).toBe(2);
+    expect(bytesOf(without).equals(bytesOf(alone))).toBe(true);
+    expect(without.fitness()).toEqual(alone.fitness());
+    expect(without.step().warnings).toEqual([]);
+    const kept = finished({ points: all });
+    expect(kept.outliers).toBe(0);
+    expect(kept.step().warnings.map(({ code }) => code)).toContain('outliers');
+  }
 });
 
 test('an aborted run rejects with the reason and can continue later', async () => {

@@ -161,6 +161,7 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
         surface.cell,
         surface.spacing,
         surface.duplicates,
+        surface.outliers,
         surface.spuriousComponents,
         surface.warning,
       ]),

@@ -1,7 +1,7 @@
 //! Input points of an implicit surface: validation, scaling into the normalised box, in which their longest side is 2,
 //! removal of duplicates, and clustering against outliers (Dinh, Turk & Slabaugh, section VI-D).
 
-use crate::math::order::{sort_by_rank, sort_distinct, sort_triples};
+use crate::math::order::{rank_f32, sort_by_rank, sort_distinct, sort_triples};
 use crate::math::{Bounds, DAffine3, DMat3, DVec3, PositionIndex, Vec3, symmetric};
 use crate::methods::MethodError;
 
@@ -28,6 +28,19 @@ pub struct Cloud {
 
 /// Minimum number of distinct points in the input cloud: fewer span no volume.
 pub const MIN_POINTS: usize = 4;
+/// Length of the clusters that are kept, relative to that of all points, below which the others are far outliers: in the
+/// paper's figures, it is 0.79.
+const FAR: f64 = 0.5;
+/// Edge length of the grid cells by which points are grouped into clusters, in mean spacings of the points: the points
+/// of touching cells are in one cluster.
+pub const CLUSTER_CELL: f64 = 2.0;
+/// Share of the points, as its inverse, that may be outliers at either end of an axis.
+const ENDS: usize = 100;
+/// Length of the other points, relative to that of all, below which there is a warning: at a quarter, the object is 16 to 40
+/// cells long.
+const SMALL: f32 = 0.25;
+/// Number of points below which none counts as an outlier without being told.
+const FEW_POINTS: usize = 20;
 /// Ratio of the least to the largest standard deviation of points along their principal axes up to which a cloud counts
 /// as flat, and is rejected because it spans no volume.
 const FLAT: f64 = 1e-6;
@@ -122,6 +135,58 @@ impl Cloud {
             return Err(MethodError::invalid("points", "all lie in one plane; they have to span a volume"));
         }
         Ok(())
+    }
+
+    /// Returns the cloud without far outliers, and their positions: points in none of the `keep` largest clusters, if these
+    /// clusters are less than half as long as the cloud. Where they are longer, outliers hardly matter for the box, and that of
+    /// the paper is around all points.
+    pub fn without_far_outliers(self, keep: usize) -> (Self, Vec<Vec3>) {
+        let kept = self.largest_clusters(keep);
+        let inner = self.select(&kept);
+        if inner.len() < MIN_POINTS || inner.length() >= FAR * self.length() {
+            return (self, Vec::new());
+        }
+        // Beside outliers at other scales, cells of clusters were too large.
+        let outside = self.points_outside(&inner);
+        let (near, far) = inner.without_far_outliers(keep);
+        (near, [far, outside].concat())
+    }
+
+    /// Returns the indices of the points in the `keep` largest clusters, in ascending order, to discard outliers.
+    pub fn largest_clusters(&self, keep: usize) -> Vec<u32> {
+        // Scaled, but not moved: between far outliers, rounding would move the others together.
+        let scale = BoxMap::of(&self.points).scale();
+        let points: Vec<Vec3> = self.points.iter().map(|p| (p.as_dvec3() * scale).as_vec3()).collect();
+        largest_clusters(&points, (CLUSTER_CELL * mean_spacing(&points)) as f32, keep)
+    }
+
+    /// Returns half the longest side of the bounding box of the points, which must not all be equal.
+    fn length(&self) -> f64 {
+        1.0 / BoxMap::of(&self.points).scale()
+    }
+
+    /// Returns the points that are not in `other`.
+    pub fn points_outside(&self, other: &Self) -> Vec<Vec3> {
+        if other.len() == self.len() {
+            return Vec::new();
+        }
+        let known = PositionIndex::new(&other.points);
+        self.points.iter().copied().filter(|&p| known.find(p).is_none()).collect()
+    }
+
+    /// Whether nearly all points are in a small part of the bounding box of all: without a hundredth at either end of each
+    /// axis, its longest side is less than a quarter as long.
+    pub fn has_far_outliers(&self) -> bool {
+        let ends = self.len().div_ceil(ENDS);
+        let ranges = |left_out: usize| {
+            let range = |axis: usize| {
+                let mut values: Vec<f32> = self.points.iter().map(|p| p[axis]).collect();
+                sort_by_rank(&mut values, |&x| u64::from(rank_f32(x)));
+                values[values.len() - 1 - left_out] - values[left_out]
+            };
+            (0..3).map(range).fold(0.0, f32::max)
+        };
+        self.len() >= FEW_POINTS && ranges(ends) < SMALL * ranges(0)
     }
 
     /// Returns the cloud with its points mapped by `map` from world units into the normalised box. Normals are

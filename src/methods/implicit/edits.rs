@@ -120,8 +120,9 @@ impl PointEdits {
         surface.check_count()?;
         surface.check_span()?;
         let all_in_box = |all: &[Vec3]| all.iter().map(|&p| map.in_box(p)).collect::<Vec<Vec3>>();
-        let [mut outside, inside] = exterior.valid_after_edits(&surface.points, &all_in_box(&self.added));
-        outside.extend(all_in_box(&self.exterior));
+        let [added, marked] = [&self.added, &self.exterior].map(|points| all_in_box(points));
+        let [mut outside, inside] = exterior.valid_after_edits(&surface.points, &added, &marked);
+        outside.extend(marked);
         outside.extend(&exterior.on_sphere);
         let outside = Cloud { points: outside, ..Cloud::default() }.distinct().points;
         let constraints = Constraints::new(&surface, &outside, &inside);

@@ -37,8 +37,8 @@ const MIN_CLEARANCE: f32 = 0.8;
 pub struct Exterior {
     /// Exterior points near the surface, given by the caller or made from the surface points.
     pub near: Vec<Vec3>,
-    /// Points inside near the surface, if there are any.
-    pub inside: Vec<Vec3>,
+    /// Points on both sides of the surface; none if there are to be constraints outside only.
+    pub off_surface: OffSurface,
     /// Distance of the points in `near` from the surface points from which they were made, in units of the normalised
     /// box; 0 if the caller gave them.
     pub offset: f32,
@@ -47,22 +47,54 @@ pub struct Exterior {
 }
 
 impl Exterior {
-    /// Returns the points outside, [`Self::near`], and inside that remain valid after edits of the surface points: they are near a
-    /// point of `surface`, the edited points, from which they may have been made, and not too near to a point of
-    /// `added`. Points given by the caller are all kept.
-    pub fn valid_after_edits(&self, surface: &[Vec3], added: &[Vec3]) -> [Vec<Vec3>; 2] {
-        let cell = if self.offset > 0.0 { self.offset } else { 1.0 };
-        let [surface, added] = [surface, added].map(|points| PointGrid::of(points, cell));
-        [&self.near, &self.inside].map(|side| {
-            let valid = |p: &&Vec3| {
-                self.offset == 0.0
-                    || surface.has_within(**p, MAX_OFFSETS * self.offset)
-                        && !added.has_within(**p, MIN_CLEARANCE * self.offset)
+    /// Returns the points outside and inside that remain valid after edits of the surface points: they are near a point of
+    /// `surface`, the edited points, from which they may have been made, and not too near to a point of `added`; those inside
+    /// are not near a point of `marked`, which the user knows to be outside. Points given by the caller are all kept.
+    pub fn valid_after_edits(&self, surface: &[Vec3], added: &[Vec3], marked: &[Vec3]) -> [Vec<Vec3>; 2] {
+        let valid = |points: &[Vec3], offset: f32| {
+            if offset == 0.0 {
+                return points.to_vec();
+            }
+            let [surface, added] = [surface, added].map(|points| PointGrid::of(points, offset));
+            let is_valid = |p: &&Vec3| {
+                surface.has_within(**p, MAX_OFFSETS * offset)
+                    && !added.has_within(**p, MIN_CLEARANCE * offset)
             };
-            side.iter().filter(valid).copied().collect()
-        })
+            points.iter().filter(is_valid).copied().collect()
+        };
+        let OffSurface { outside, inside, offset, .. } = &self.off_surface;
+        let [outside, inside] = [outside, inside].map(|points| valid(points, *offset));
+        [[valid(&self.near, self.offset), outside].concat(), clear_of(marked, inside, *offset)]
+    }
+
+    /// Returns these points, which are known to be outside, with points on both sides that were `found`; `outside_share` is
+    /// the share of these points that are outside by what was found. Where they contradict each other, which side is outside
+    /// is ambiguous, and there are no points inside.
+    pub fn with_both_sides(self, found: OffSurface, outside_share: f64) -> Self {
+        let mut off_surface = if outside_share >= AGREEMENT {
+            found
+        } else if outside_share <= 1.0 - AGREEMENT {
+            found.exchanged()
+        } else {
+            OffSurface::default()
+        };
+        off_surface.inside = clear_of(&self.near, off_surface.inside, off_surface.offset);
+        Self { off_surface, ..self }
     }
 }
+
+/// Returns those of `points` that are not near one of `others`; `offset` is their distance from the surface.
+fn clear_of(others: &[Vec3], mut points: Vec<Vec3>, offset: f32) -> Vec<Vec3> {
+    if offset > 0.0 && !others.is_empty() {
+        let others = PointGrid::of(others, offset);
+        points.retain(|&p| !others.has_within(p, MIN_CLEARANCE * offset));
+    }
+    points
+}
+
+/// Share of points known to be outside that have to be on the same side of a surface that was found; cameras see some points
+/// wrongly.
+pub const AGREEMENT: f64 = 0.9;
 
 /// Maximum distance of an exterior point from the nearest surface point, in units of [`Exterior::offset`]: a farther
 /// one is dropped, since the points from which it was made were removed.
@@ -71,13 +103,8 @@ const MAX_OFFSETS: f32 = 1.25;
 /// Returns the exterior points `given` by the caller, in units of the normalised box, with points on a sphere around
 /// `cloud`.
 pub fn exterior_from_points(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
-    Exterior { near: given, inside: Vec::new(), offset: 0.0, on_sphere: sphere_around(&cloud.points) }
-}
-
-/// Returns points off the surface with points on a sphere around `cloud`.
-pub fn exterior_off_surface(cloud: &Cloud, found: OffSurface) -> Exterior {
-    let OffSurface { outside, inside, offset, .. } = found;
-    Exterior { near: outside, inside, offset, on_sphere: sphere_around(&cloud.points) }
+    let on_sphere = sphere_around(&cloud.points);
+    Exterior { near: given, off_surface: OffSurface::default(), offset: 0.0, on_sphere }
 }
 
 /// Makes exterior points for the surface points `cloud`, whose mean distance to the nearest neighbour is `spacing`.
@@ -97,7 +124,8 @@ pub fn generate_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: 
         directions.directions.iter().map(|&(i, direction)| cloud.points[i as usize] + direction * offset);
     let outside: Vec<Vec3> = candidates.filter(|&p| !surface.has_within(p, MIN_CLEARANCE * offset)).collect();
     let kept = subsampled(&outside, target_count, seed).into_iter().map(|i| outside[i as usize]);
-    Exterior { near: kept.collect(), inside: Vec::new(), offset, on_sphere: sphere_around(&cloud.points) }
+    let on_sphere = sphere_around(&cloud.points);
+    Exterior { near: kept.collect(), off_surface: OffSurface::default(), offset, on_sphere }
 }
 
 /// Directions that lead outwards from surface points, for making exterior points, and the noise of the surface points.
@@ -308,9 +336,9 @@ mod tests {
             let again = generate_exterior(cloud, cameras, spacing, 1);
             assert_eq!((&near, &on_sphere, offset), (&again.near, &again.on_sphere, again.offset));
             // Each is kept with the points it was made from, and dropped if a surface point is added in its position.
-            assert_eq!(again.valid_after_edits(&cloud.points, &[])[0].len(), near.len());
-            assert_eq!(again.valid_after_edits(&cloud.points, &near[..1])[0].len(), near.len() - 1);
-            assert_eq!(again.valid_after_edits(&[], &[])[0].len(), 0);
+            assert_eq!(again.valid_after_edits(&cloud.points, &[], &[])[0].len(), near.len());
+            assert_eq!(again.valid_after_edits(&cloud.points, &near[..1], &[])[0].len(), near.len() - 1);
+            assert_eq!(again.valid_after_edits(&[], &[], &[])[0].len(), 0);
         }
     }
 

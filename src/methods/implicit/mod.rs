@@ -58,7 +58,7 @@ pub use camera::Camera;
 pub use cloud::Cloud;
 pub use edits::PointEdits;
 pub use measure::Fitness;
-pub use params::{ImplicitParams, IsoValue, KernelKind};
+pub use params::{ImplicitParams, IsoValue, KernelKind, Sides};
 
 use super::method::method;
 use super::params::Auto;
@@ -70,7 +70,7 @@ use crate::warning::{Warning, WarningCode};
 use automatic::OffSurfaceSearch;
 use cloud::{BoxMap, MAX_POINTS, MIN_POINTS};
 use color::Coloring;
-use exterior::{Exterior, exterior_from_points, exterior_off_surface, generate_exterior};
+use exterior::{AGREEMENT, Exterior, exterior_from_points, generate_exterior};
 use extract::{Extraction, default_cell};
 use field::Field;
 use kernel::{Kernel, KernelTable};
@@ -90,7 +90,8 @@ pub struct ImplicitOptions {
     pub cameras: Vec<Camera>,
     /// Maximum number of points that become surface constraints; larger clouds are subsampled.
     pub max_points: usize,
-    /// Number of clusters of nearby points to keep, largest first, which discards outliers; `None` keeps all clusters.
+    /// Number of clusters of nearby points to keep, largest first, which discards outliers; `None` keeps all clusters. The
+    /// normalised box is that of all points, or if the clusters are less than half as long, theirs.
     pub keep_components: Option<usize>,
     /// Initial parameters of kernel, regularisation, solver and extraction.
     pub params: ImplicitParams,
@@ -122,8 +123,10 @@ pub struct ImplicitSurface {
     origin: DVec3,
     /// The input points, in world units.
     original: Vec<Vec3>,
-    /// The input points without duplicates, mapped into the normalised box.
+    /// The input points without duplicates and far outliers, mapped into the normalised box.
     cloud: Cloud,
+    /// The distinct input points that are outliers so far away that the normalised box is without them, in world units.
+    far_outliers: Vec<Vec3>,
     map: BoxMap,
     options: ImplicitOptions,
     params: ImplicitParams,
@@ -234,15 +237,20 @@ impl ImplicitSurface {
         points.validate()?;
         options.cameras = cameras_at(points.origin, options.cameras);
         let original = points.points.clone();
-        let cloud = points.distinct();
-        cloud.check_count()?;
+        let distinct = points.distinct();
+        distinct.check_count()?;
+        BoxMap::of(&distinct.points).check_precision()?;
+        let (cloud, far_outliers) = match options.keep_components {
+            Some(keep) => distinct.without_far_outliers(keep),
+            None => (distinct, Vec::new()),
+        };
         let map = BoxMap::of(&cloud.points);
         map.check_precision()?;
         // Rounding in the box can make distinct points equal.
         let cloud = cloud.mapped(&map).distinct();
         cloud.check_count()?;
         cloud.check_span()?;
-        Ok(Self::from_parts(original, cloud, map, options))
+        Ok(Self { far_outliers, ..Self::from_parts(original, cloud, map, options) })
     }
 
     fn from_parts(original: Vec<Vec3>, cloud: Cloud, map: BoxMap, options: ImplicitOptions) -> Self {
@@ -250,6 +258,7 @@ impl ImplicitSurface {
             origin: cloud.origin,
             original,
             cloud,
+            far_outliers: Vec::new(),
             map,
             params: options.params.clone(),
             edits: PointEdits::default(),
@@ -338,13 +347,19 @@ impl ImplicitSurface {
     }
 
     fn warnings(&self) -> Vec<Warning> {
-        let text = "inside and outside are ambiguous: walls or gaps are about as thin as the spacing of the points or their \
-                    noise; components, handles and volume may be wrong";
-        if self.ambiguous_sides && self.is_two_sided() {
-            vec![Warning::new(WarningCode::ThinParts, text)]
-        } else {
-            Vec::new()
-        }
+        let sides = "inside and outside are ambiguous: walls or gaps are about as thin as the spacing of the points or their \
+                     noise; components, handles and volume may be wrong";
+        let outliers = "a few points are so far away that the others are a small part of the box: cells are too large for the \
+                        object, and there may be no surface; keep only the largest cluster of points, or remove those points";
+        let found = [
+            (self.has_far_outliers(), WarningCode::Outliers, outliers),
+            (self.ambiguous_sides && self.is_two_sided(), WarningCode::ThinParts, sides),
+        ];
+        found.into_iter().filter(|one| one.0).map(|(_, code, text)| Warning::new(code, text)).collect()
+    }
+
+    fn has_far_outliers(&self) -> bool {
+        self.samples.as_ref().is_some_and(|samples| samples.has_far_outliers)
     }
 
     fn subsample(&mut self, mut sampling: Box<Sampling>) -> Result<Stage, MethodError> {
@@ -376,8 +391,11 @@ impl ImplicitSurface {
             }
             Some(mut search) => {
                 let Some(found) = search.advance() else { return Ok(Some(search)) };
-                self.ambiguous_sides = found.is_ambiguous();
-                exterior_off_surface(&samples.cloud, found)
+                let known = self.known_outside(samples);
+                let share = search.outside_share(&known.near);
+                let contradict = share < AGREEMENT && share > 1.0 - AGREEMENT;
+                self.ambiguous_sides = found.is_ambiguous() || contradict;
+                known.with_both_sides(found, share)
             }
         };
         let constraints = self.edits.constraints(samples, &exterior, &self.original, &self.map)?;
@@ -386,11 +404,17 @@ impl ImplicitSurface {
         Ok(None)
     }
 
-    /// Whether there are constraints on both sides of the surface: if the caller leaves that open, and gives no exterior
-    /// points or cameras.
     fn is_two_sided(&self) -> bool {
-        let is_open = self.options.exterior.is_none() && self.options.cameras.is_empty();
-        self.params.lambda_exterior == Auto::Auto && is_open
+        self.params.sides == Sides::Both
+    }
+
+    /// Returns the points outside that the caller gave or that cameras show, if there are any.
+    fn known_outside(&self, samples: &Samples) -> Exterior {
+        if self.options.exterior.is_none() && self.options.cameras.is_empty() {
+            exterior_from_points(&samples.cloud, Vec::new())
+        } else {
+            self.exterior_points(samples)
+        }
     }
 
     /// Returns the points outside that the caller gave, or that are made from cameras, normals or the points.
@@ -433,10 +457,7 @@ impl ImplicitSurface {
 
     fn regularized(&self, mut constraints: Constraints) -> Constraints {
         let Choice { lambda_surface, lambda_exterior, .. } = self.in_force();
-        // Those that are chosen are for this number of points.
-        let is_chosen = self.params.lambda_surface == Auto::Auto;
-        let surface = if is_chosen { lambda_surface } else { constraints.crowded(lambda_surface) };
-        constraints.regularize(surface, lambda_exterior);
+        constraints.regularize(lambda_surface, lambda_exterior);
         constraints
     }
 
@@ -493,7 +514,10 @@ impl ImplicitSurface {
     /// Returns the error of a failed solve, and discards its linear system, so that later edits do not revise it.
     fn singular(&mut self) -> MethodError {
         (self.base_edits, self.solver) = (None, None);
-        let cause = if self.params.lambda_surface == Auto::Given(0.0) {
+        let cause = if self.has_far_outliers() {
+            "a few points are so far away that the others nearly coincide in the box; discard outliers with keepComponents, \
+             or remove them"
+        } else if self.params.lambda_surface == Auto::Given(0.0) {
             "lambdaSurface is 0 and some points are too close together; set it above 0"
         } else {
             "rounding errors exceed the tolerance; use a larger tolerance or lambda, or a narrower kernel"
@@ -588,8 +612,7 @@ impl ImplicitSurface {
         params.validate()?;
         let before = std::mem::replace(&mut self.params, params);
         let (now, only_extraction) = (&self.params, before.with_extraction_of(&self.params));
-        let other_sides = (before.lambda_exterior == Auto::Auto) != (now.lambda_exterior == Auto::Auto);
-        if other_sides && !matches!(self.stage, Stage::Subsample(_)) {
+        if before.sides != now.sides && !matches!(self.stage, Stage::Subsample(_)) {
             // Without them, edits in the meantime wait for the new ones.
             self.exterior = None;
             (self.stage, self.slices) = (Stage::Constrain(None), 0);
@@ -688,7 +711,13 @@ impl ImplicitSurface {
     /// Returns the number of input points that are ignored because they equal another one, exactly or after rounding to
     /// single precision in the normalised box.
     pub fn duplicates(&self) -> usize {
-        self.original.len() - self.cloud.len()
+        self.original.len() - self.cloud.len() - self.far_outliers.len()
+    }
+
+    /// Returns the number of distinct input points that are discarded, since they are in none of the clusters that
+    /// [`ImplicitOptions::keep_components`] keeps; 0 until the samples are selected.
+    pub fn outliers(&self) -> usize {
+        self.samples.as_ref().map_or(0, |samples| self.far_outliers.len() + samples.outliers.len())
     }
 
     /// Returns the mean distance from a sampled point to its nearest neighbour, estimated from at most 4000 samples, in

@@ -16,8 +16,8 @@ parameters! {
             symbol: "φ",
         },
         /// δ of the multi-order kernel, its first-order smoothness, in inverse units of the normalised box: larger
-        /// values pull the surface tight around the points.
-        pub delta: Auto = Auto::Given(5.0) => {
+        /// values pull the surface tight around the points. [`Auto::Auto`] chooses it by their density; 5 is the paper's.
+        pub delta: Auto = Auto::Auto => {
             name: "delta",
             label: "First-order smoothness",
             help: "Larger values pull the surface tight around the points, like a membrane; from 25 on it breaks up at large gaps.",
@@ -52,8 +52,8 @@ parameters! {
         },
         /// Regularisation λ of surface constraints, before confidences and the number of points are taken into account:
         /// the larger, the more the implicit function f may differ from 0 at the points; with 0 the surface
-        /// interpolates them.
-        pub lambda_surface: Auto = Auto::Given(0.001) => {
+        /// interpolates them. [`Auto::Auto`] chooses it by density and noise; 0.001 is the paper's.
+        pub lambda_surface: Auto = Auto::Auto => {
             name: "lambdaSurface",
             label: "Regularization, surface",
             help: "0 interpolates every point; larger values tolerate noise and give a smoother surface.",
@@ -61,12 +61,13 @@ parameters! {
             range: 0.0..=10.0,
             step: 0.0001,
         },
-        /// Regularisation λ of exterior constraints: the larger, the more the implicit function f may differ from −1 at
-        /// them. [`Auto::Auto`] adds constraints of value 1 inside, and makes both as soft as the noise demands.
-        pub lambda_exterior: Auto = Auto::Given(2.0) => {
+        /// Regularisation λ of constraints off the surface: the larger, the more the implicit function f may differ from −1
+        /// at those outside, and from 1 at those inside. [`Auto::Auto`] makes them as soft as the noise demands; 2 is the
+        /// paper's.
+        pub lambda_exterior: Auto = Auto::Auto => {
             name: "lambdaExterior",
-            label: "Regularization, exterior",
-            help: "How much exterior constraints may be missed: they only fix the orientation, so a large value is right.",
+            label: "Regularization, off-surface",
+            help: "How much constraints off the surface may be missed: they only fix the orientation, so a large value is right.",
             symbol: "λe",
             range: 0.0..=1000.0,
             step: 0.1,
@@ -93,6 +94,12 @@ parameters! {
             name: "level",
             label: "Iso-value",
             help: "Value of f at the surface: zero is the paper's; mean is the mean of f at the points, which lie slightly outside the zero set.",
+        },
+        /// The sides of the surface on which there are constraints besides those on it.
+        pub sides: Sides = Sides::Both => {
+            name: "sides",
+            label: "Constraints off the surface",
+            help: "On both sides, noise does not shrink the surface; outside only is the paper's.",
         },
     }
 }
@@ -122,7 +129,29 @@ choices! {
     }
 }
 
+choices! {
+    /// Choice of the sides of the surface on which there are constraints besides those on it.
+    pub enum Sides {
+        /// Outside and inside, as far as the points tell these apart; parts of the surface that no point supports are left
+        /// out.
+        Both = "both",
+        /// Outside only, as in Dinh, Turk & Slabaugh.
+        Outside = "outside",
+    }
+}
+
 impl ImplicitParams {
+    /// Returns the parameters of Dinh, Turk & Slabaugh, which do not depend on the points.
+    pub fn paper() -> Self {
+        Self {
+            delta: Auto::Given(5.0),
+            lambda_surface: Auto::Given(0.001),
+            lambda_exterior: Auto::Given(2.0),
+            sides: Sides::Outside,
+            ..Self::default()
+        }
+    }
+
     /// Checks every numeric parameter against its range.
     ///
     /// # Errors

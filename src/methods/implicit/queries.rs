@@ -5,7 +5,7 @@ use super::camera::Camera;
 use super::fast::FastField;
 use super::measure::Fitness;
 use super::{ImplicitSurface, Solved, cameras_at, color};
-use crate::math::{Bounds, DAffine3, DVec3, Vec3};
+use crate::math::{Bounds, DAffine3, DVec3, PositionIndex, Vec3};
 use crate::methods::MethodError;
 use crate::volume::{Volume, VolumeError, VolumeInit, Voxels};
 
@@ -48,16 +48,23 @@ impl ImplicitSurface {
         })
     }
 
-    /// Returns the input points with the edits applied: without those removed, with those added; in world units.
+    /// Returns the input points with the edits applied: without outliers and those removed, with those added; in world
+    /// units.
     fn points(&self) -> Vec<Vec3> {
         let removed = self.edits.removed_positions(&self.original, &self.map);
-        let stays = |p: &Vec3| removed.find(self.map.in_box(*p)).is_none();
+        let far = self.far_outliers.iter().map(|&p| self.map.in_box(p));
+        let outliers = self.samples.iter().flat_map(|samples| samples.outliers.iter().copied());
+        let outliers = PositionIndex::new(&far.chain(outliers).collect::<Vec<Vec3>>());
+        let stays = |p: &Vec3| {
+            let p = self.map.in_box(*p);
+            removed.find(p).is_none() && outliers.find(p).is_none()
+        };
         let left = self.original.iter().copied().filter(stays);
         left.chain(self.edits.added.iter().copied()).collect()
     }
 
-    /// Measures how well the last finished surface fits all points, including those not sampled as constraints: their
-    /// distances from it, and its mean curvature.
+    /// Measures how well the last finished surface fits all points but outliers, including those not sampled as constraints:
+    /// their distances from it, and its mean curvature.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if there is no surface yet.

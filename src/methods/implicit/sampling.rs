@@ -2,14 +2,11 @@
 //! milliseconds of work (Dinh, Turk & Slabaugh, section VI-B).
 
 use super::automatic::Choice;
-use super::cloud::{Cloud, largest_clusters, mean_spacing};
+use super::cloud::{CLUSTER_CELL, Cloud, largest_clusters, mean_spacing};
 use crate::math::{Random, Vec3};
 use crate::methods::MethodError;
 use crate::spatial::PointGrid;
 
-/// Edge length of the grid cells by which points are grouped into clusters, in mean spacings of the points: the points
-/// of touching cells are in one cluster.
-const CLUSTER_CELL: f64 = 2.0;
 /// Number of points visited in one call of [`Sampling::advance`], which then takes about ten milliseconds.
 const SLICE: usize = 50_000;
 /// Maximum number of radii that are tried in Poisson-disc sampling, to find one that leaves the wanted number of
@@ -29,6 +26,10 @@ pub struct Samples {
     pub spacing: f64,
     /// Measures of the selected points, and the values chosen by them.
     pub choice: Choice,
+    /// The points in none of the clusters that are kept, in units of the normalised box.
+    pub outliers: Vec<Vec3>,
+    /// Whether there are far outliers among the points that are kept.
+    pub has_far_outliers: bool,
 }
 
 /// Selection of the points of a cloud that become surface constraints, in slices of about ten milliseconds of work.
@@ -64,10 +65,16 @@ impl Sampling {
             return Ok(None);
         };
         let Some(chosen) = poisson_disc.advance(&kept.points, SLICE) else { return Ok(None) };
-        let cloud = kept.select(&chosen);
-        cloud.check_span()?;
-        let spacing = mean_spacing(&cloud.points);
-        Ok(Some(Samples { spacing, choice: Choice::of(&cloud.points, spacing), cloud }))
+        let samples = kept.select(&chosen);
+        samples.check_span()?;
+        let spacing = mean_spacing(&samples.points);
+        Ok(Some(Samples {
+            spacing,
+            choice: Choice::of(&samples.points, spacing),
+            cloud: samples,
+            outliers: cloud.points_outside(kept),
+            has_far_outliers: kept.has_far_outliers(),
+        }))
     }
 
     fn largest(cloud: &Cloud, keep: usize) -> Result<Cloud, MethodError> {

@@ -6,14 +6,17 @@
 
 use super::kernel::Kernel;
 use super::solve::{Solution, SolverPosition};
-use super::{ImplicitParams, ImplicitSurface, PointEdits, Solved, Stage};
+use super::{ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits, Sides, Solved, Stage};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
+use crate::methods::params::Auto;
 use crate::methods::saved::{Hash, Magic, decode, encode};
 use serde::{Deserialize, Serialize};
 
-const MAGIC: Magic = *b"VSCLIMP\x02";
+const MAGIC: Magic = *b"VSCLIMP\x03";
+/// States before there were `sides`.
+const MAGIC_WITHOUT_SIDES: Magic = *b"VSCLIMP\x02";
 
 /// The stage of the reconstruction that a saved run had reached: a [`Stage`] without its data.
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -29,9 +32,15 @@ enum SavedStage {
 
 /// The saved form of an [`ImplicitSurface`], with its parameters and edits, but without its points and other options.
 #[derive(Serialize, Deserialize)]
-struct State {
+struct State<Params = ImplicitParams> {
     fingerprint: u64,
-    params: ImplicitParams,
+    params: Params,
+    rest: Rest,
+}
+
+/// The rest of a [`State`].
+#[derive(Serialize, Deserialize)]
+struct Rest {
     edits: PointEdits,
     base: Option<PointEdits>,
     saved_stage: SavedStage,
@@ -41,6 +50,35 @@ struct State {
     spurious_components: u32,
     solved: Option<Function>,
     surface: Surface,
+}
+
+/// The parameters of a state from before there were `sides`, in the order of that time.
+#[derive(Deserialize)]
+struct ParamsWithoutSides(KernelKind, Auto, f64, f64, Auto, Auto, f64, f64, IsoValue);
+
+impl From<State<ParamsWithoutSides>> for State {
+    /// There were constraints on both sides if λ of those outside was `auto`.
+    fn from(state: State<ParamsWithoutSides>) -> Self {
+        let ParamsWithoutSides(kernel, delta, tau, sigma, lambda_surface, lambda_exterior, ..) = state.params;
+        let ParamsWithoutSides(.., tolerance, cell, level) = state.params;
+        let sides = if lambda_exterior == Auto::Auto { Sides::Both } else { Sides::Outside };
+        Self {
+            params: ImplicitParams {
+                kernel,
+                delta,
+                tau,
+                sigma,
+                lambda_surface,
+                lambda_exterior,
+                tolerance,
+                cell,
+                level,
+                sides,
+            },
+            fingerprint: state.fingerprint,
+            rest: state.rest,
+        }
+    }
 }
 
 /// The saved form of the last solution: the implicit function f.
@@ -71,24 +109,26 @@ impl ImplicitSurface {
             &State {
                 fingerprint: self.fingerprint(),
                 params: self.params.clone(),
-                edits: self.edits.clone(),
-                base: self.base_edits.clone(),
-                saved_stage: self.stage.reached(),
-                slices: self.slices,
-                iteration: self.iteration,
-                residual: self.residual,
-                spurious_components: self.spurious_components as u32,
-                solved: self.solved.as_ref().map(|solved| Function {
-                    kernel: solved.kernel,
-                    centres: solved.centres.clone(),
-                    solution: solved.solution.clone(),
-                    mean: solved.mean,
-                }),
-                surface: Surface {
-                    positions: mesh.positions.clone(),
-                    triangles: mesh.triangles.clone(),
-                    normals: mesh.normals.clone(),
-                    colors: mesh.colors.clone(),
+                rest: Rest {
+                    edits: self.edits.clone(),
+                    base: self.base_edits.clone(),
+                    saved_stage: self.stage.reached(),
+                    slices: self.slices,
+                    iteration: self.iteration,
+                    residual: self.residual,
+                    spurious_components: self.spurious_components as u32,
+                    solved: self.solved.as_ref().map(|solved| Function {
+                        kernel: solved.kernel,
+                        centres: solved.centres.clone(),
+                        solution: solved.solution.clone(),
+                        mean: solved.mean,
+                    }),
+                    surface: Surface {
+                        positions: mesh.positions.clone(),
+                        triangles: mesh.triangles.clone(),
+                        normals: mesh.normals.clone(),
+                        colors: mesh.colors.clone(),
+                    },
                 },
             },
         )
@@ -101,7 +141,11 @@ impl ImplicitSurface {
     /// # Errors
     /// [`MethodError::BadState`] if the bytes are not such a state; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let state: State = decode(&MAGIC, bytes)?;
+        let state = if bytes.starts_with(&MAGIC_WITHOUT_SIDES) {
+            decode::<State<ParamsWithoutSides>>(&MAGIC_WITHOUT_SIDES, bytes)?.into()
+        } else {
+            decode::<State>(&MAGIC, bytes)?
+        };
         self.restore_state(state).map_err(|error| match error {
             MethodError::BadState { .. } => error,
             other => MethodError::BadState { field: "contents", problem: other.to_string() },
@@ -114,29 +158,30 @@ impl ImplicitSurface {
             return bad("points", "the state belongs to other points or options");
         }
         state.params.validate()?;
-        let Surface { positions, triangles, normals, colors } = state.surface;
+        let rest = state.rest;
+        let Surface { positions, triangles, normals, colors } = rest.surface;
         let origin = self.origin;
         let mesh = TriangleMesh { positions, origin, triangles, normals, colors, ..TriangleMesh::default() };
         mesh.validate()?;
-        if state.saved_stage.needs_solution() && state.solved.is_none() {
+        if rest.saved_stage.needs_solution() && rest.solved.is_none() {
             return bad("solution", "missing");
         }
-        for edits in std::iter::once(&state.edits).chain(&state.base) {
+        for edits in std::iter::once(&rest.edits).chain(&rest.base) {
             edits.validate(&self.original, &self.map)?;
         }
         let mut next = self.restarted();
-        (next.params, next.edits, next.base_edits) = (state.params, state.edits, state.base);
-        if let Some(Function { kernel, centres, solution, mean }) = state.solved {
+        (next.params, next.edits, next.base_edits) = (state.params, rest.edits, rest.base);
+        if let Some(Function { kernel, centres, solution, mean }) = rest.solved {
             if solution.weights.len() != centres.len() || solution.coefficients.len() != kernel.polynomials()
             {
                 return bad("solution", "inconsistent");
             }
             next.solved = Some(Solved::new(kernel, centres, solution, mean));
         }
-        next.replay(state.saved_stage, state.slices)?;
-        next.spurious_components = state.spurious_components as usize;
-        next.iteration = state.iteration;
-        next.residual = state.residual;
+        next.replay(rest.saved_stage, rest.slices)?;
+        next.spurious_components = rest.spurious_components as usize;
+        next.iteration = rest.iteration;
+        next.residual = rest.residual;
         next.version = self.version;
         next.take_mesh(mesh);
         *self = next;
@@ -168,7 +213,11 @@ impl ImplicitSurface {
 
     fn restarted(&self) -> Self {
         let (original, cloud) = (self.original.clone(), self.cloud.clone());
-        Self { clock: self.clock, ..Self::from_parts(original, cloud, self.map, self.options.clone()) }
+        Self {
+            clock: self.clock,
+            far_outliers: self.far_outliers.clone(),
+            ..Self::from_parts(original, cloud, self.map, self.options.clone())
+        }
     }
 
     /// Recomputes what a saved state does not store: everything up to the stage `saved_stage`, and that stage up to the

@@ -168,6 +168,11 @@ export abstract class LabParts<Example extends Listed> {
     this.#params?.show(params);
   }
 
+  /** Displays the values that the method chose for automatic parameters, by name. */
+  protected displayChosen(values: Record<string, number>): void {
+    this.#params?.showChosen(values);
+  }
+
   protected hideParams(hidden: Record<string, boolean>): void {
     this.#params?.hide(hidden);
   }

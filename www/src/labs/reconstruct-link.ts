@@ -1,6 +1,7 @@
 /** Converts the Reconstruct lab's settings to the hash of an address, `#reconstruct?…`, and back. */
 import { shortenedPoint } from '../placing';
 import type { ParamValues, Vec3 } from '../protocol';
+import { withPaper } from '../reconstruct/before';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { isCloudPreset } from '../reconstruct/presets';
 import type { Edits } from '../reconstruct/protocol';
@@ -13,6 +14,12 @@ const ADDRESS = '#reconstruct';
 const DIGITS = 6;
 /** Most points changed by hand that a link includes: some programs truncate long addresses. */
 export const MOST_EDITS = 200;
+
+/**
+ * Version number of the defaults that a link relies on. Links without a version were written when the defaults were the
+ * paper's values, on which examples and figures still rely.
+ */
+const VERSION = '2';
 
 /**
  * Settings of the Reconstruct lab that are contained in a link; missing ones are as in the example, or else the
@@ -107,6 +114,7 @@ export function toHash(linked: LinkedCloud): string {
   for (const point of linked.edits.added) query.append('add', point.join(','));
   for (const point of linked.edits.outside) query.append('outside', point.join(','));
   if (linked.edits.removed.length > 0) query.set('remove', linked.edits.removed.join(','));
+  if (linked.file !== undefined && linked.example === undefined) query.set('v', VERSION);
   const text = query.toString().replaceAll('%2C', ',');
   return text ? `${ADDRESS}?${text}` : ADDRESS;
 }
@@ -125,10 +133,11 @@ export function fromHash(hash: string): LinkedCloud | undefined {
     outside: pointsIn('outside'),
     removed: [...new Set(removed)].filter((index) => Number.isInteger(index) && index >= 0),
   };
-  return {
+  const linked: LinkedCloud = {
     ...textsIn(query, ['example', 'file', 'color']),
     ...numbersIn(query, ['maxPoints', 'keepComponents', 'photo']),
     params: paramsIn(query),
     edits,
   };
+  return query.has('v') || linked.file === undefined || linked.example !== undefined ? linked : withPaper(linked);
 }

@@ -34,12 +34,33 @@ export const FIT_ROWS: ExtraMeasure[] = [
     text: count,
   },
   {
+    name: 'interiorConstraints',
+    label: text('reconstruct.interiorConstraints'),
+    help: text('reconstruct.interiorConstraintsHelp'),
+    text: count,
+  },
+  {
     name: 'spacing',
     label: text('reconstruct.spacing'),
     help: text('reconstruct.spacingHelp'),
     text: figure,
   },
   { name: 'cell', label: text('reconstruct.cell'), help: text('reconstruct.cellHelp'), text: figure },
+  { name: 'noise', label: text('reconstruct.noise'), help: text('reconstruct.noiseHelp'), text: figure },
+  { name: 'delta', label: text('reconstruct.deltaInForce'), help: text('reconstruct.inForceHelp'), text: figure },
+  {
+    name: 'lambdaSurface',
+    label: text('reconstruct.lambdaSurfaceInForce'),
+    help: text('reconstruct.inForceHelp'),
+    text: figure,
+  },
+  {
+    name: 'lambdaExterior',
+    label: text('reconstruct.lambdaExteriorInForce'),
+    help: text('reconstruct.inForceHelp'),
+    text: figure,
+  },
+  { name: 'outliers', label: text('reconstruct.outliers'), help: text('reconstruct.outliersHelp'), text: count },
   { name: 'duplicates', label: text('reconstruct.duplicates'), help: text('reconstruct.duplicatesHelp'), text: count },
   {
     name: 'spuriousComponents',
@@ -52,10 +73,11 @@ export const FIT_ROWS: ExtraMeasure[] = [
 
 /** Returns the values of the measures of points and fit, by the names of the rows in {@link FIT_ROWS}. */
 export function fitValues(fit: Fit): Record<string, unknown> {
-  const { fitness, ...rest } = fit;
-  if (!fitness) return { ...rest };
+  const { fitness, choice, inForce, ...facts } = fit;
+  const values = { ...facts, ...(choice && { noise: choice.noise }), ...inForce };
+  if (!fitness) return values;
   const { mean, rms, max, meanCurvature } = fitness;
-  return { ...rest, fitMean: mean, fitRms: rms, fitMax: max, meanCurvature };
+  return { ...values, fitMean: mean, fitRms: rms, fitMax: max, meanCurvature };
 }
 
 /** Plot of the solver's residual and its tolerance over the iterations, for the Reconstruct lab. */

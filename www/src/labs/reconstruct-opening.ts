@@ -1,3 +1,4 @@
+import { completed } from '../reconstruct/before';
 import type { ReconstructClient } from '../reconstruct/client';
 import { CLOUDS, type CloudExample } from '../reconstruct/examples';
 import { type CloudVariant, cloudById, isCloudPreset } from '../reconstruct/presets';
@@ -81,7 +82,7 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
 
   protected async load(origin: CloudOrigin, { source, photographs }: Data): Promise<OpenedCloud> {
     const from = source ?? (await this.#presentPoints());
-    const saved = origin.session && savedIn(contentOf(origin.session, 'reconstruct'));
+    const saved = origin.session && savedIn(completed(contentOf(origin.session, 'reconstruct')));
     const setup = saved?.setup ?? this.#setupFor(origin, source === undefined);
     const cameras = photographs.map(({ view }) => view);
     const loaded = await this.#client.request('load', { source: from, cameras, setup, saved });

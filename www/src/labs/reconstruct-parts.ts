@@ -1,3 +1,4 @@
+import type { ImplicitChoice } from 'vesicle';
 import type { ReconstructClient } from '../reconstruct/client';
 import type { CloudExample } from '../reconstruct/examples';
 import type { CloudPreset, CloudVariant } from '../reconstruct/presets';
@@ -63,6 +64,8 @@ export class ReconstructParts extends RunParts<CloudExample> {
   /** Buttons that need a complete surface. */
   readonly #uses: HTMLButtonElement[];
   #photographs: readonly Photograph[] = [];
+  #choice: ImplicitChoice | undefined;
+  #params: ParamValues = {};
 
   constructor(root: HTMLElement, history: History, client: ReconstructClient, signal: AbortSignal, events: PartEvents) {
     super(root, signal, events, {
@@ -125,6 +128,7 @@ export class ReconstructParts extends RunParts<CloudExample> {
     this.options.hasCameras = photographs.length > 0;
     this.photos.show(photographs);
     this.timing.clear();
+    this.showChoice(undefined);
     const facts = { name, points: points.length / 3, colors: colors !== undefined, normals: normals !== undefined };
     this.data.show(factsOf({ ...facts, cameras: photographs.length }), example);
   }
@@ -137,11 +141,24 @@ export class ReconstructParts extends RunParts<CloudExample> {
 
   /** Shows the parameters in force; hides the constants of kernels that are not in use. */
   showParams(params: ParamValues, preset: CloudPreset | undefined, variant: CloudVariant | undefined): void {
+    this.#params = params;
     this.displayParams(params);
     const isMulti = params.kernel === 'multi-order';
     this.hideParams({ sigma: params.kernel !== 'gaussian', delta: !isMulti, tau: !isMulti });
-    this.#kernel.show(params);
     this.#figure.show(preset, variant);
+    this.#showKernel();
+  }
+
+  /** Shows what the model chose from the points for automatic parameters; undefined while it is not known. */
+  showChoice(choice: ImplicitChoice | undefined): void {
+    this.#choice = choice;
+    this.displayChosen({ ...choice });
+    this.#showKernel();
+  }
+
+  #showKernel(): void {
+    const { delta } = this.#params;
+    this.#kernel.show({ ...this.#params, ...(delta === 'auto' && this.#choice && { delta: this.#choice.delta }) });
   }
 
   /** Enables and disables controls; `surface`: whether there is a complete surface. */

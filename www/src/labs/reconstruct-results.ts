@@ -120,6 +120,7 @@ export class ReconstructResults {
   #showMeasures({ measures, fit }: MeasuredEvent): void {
     if (measures) this.#ui.measures.showMeasures(measures);
     this.#ui.measures.showExtra(fitValues(fit));
+    this.#ui.showChoice(fit.choice);
     this.#ui.warning.textContent = fit.warning ?? '';
   }
 

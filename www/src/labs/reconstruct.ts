@@ -1,3 +1,4 @@
+import { completed } from '../reconstruct/before';
 import { ReconstructClient } from '../reconstruct/client';
 import type { CloudExample } from '../reconstruct/examples';
 import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from '../reconstruct/presets';
@@ -87,7 +88,7 @@ export class ReconstructLab extends RunLab<CloudExample> {
     this.ui.options.set({ color, points: true, constraints: false, ...(isCloudPreset(example) && example.view) });
     this.ui.photos.choose(photoFor(example, linked?.photo));
     this.#settings.showParams(params);
-    if (session) return this.#resume(contentOf(session, 'reconstruct'));
+    if (session) return this.#resume(completed(contentOf(session, 'reconstruct')));
     await this.client.request('play', undefined);
   }
 

@@ -1,4 +1,5 @@
 /** Code of the Reconstruct lab's runs. */
+import type { ImplicitChoice } from 'vesicle';
 import { text } from '../texts';
 import { bytesOf, callsOf, chosen, type Program } from '../worker/code';
 import { literal } from '../worker/literal';
@@ -6,10 +7,17 @@ import { Refusal } from '../worker/refusal';
 import { toPointEdits } from './model';
 import type { CameraView, Edits, PointArray, Setup } from './protocol';
 
+/** Input of the model, and its choices if any of its parameters is automatic. */
+interface Data {
+  file: string | undefined;
+  cameras: readonly CameraView[];
+  choice: ImplicitChoice | undefined;
+}
+
 /** Returns how code makes the model of a set-up, with points from `file` or, if they were computed, from one that is saved. */
 export function programOf(
   { params, edits, maxPoints, keepComponents }: Setup,
-  { file, cameras }: { file: string | undefined; cameras: readonly CameraView[] },
+  { file, cameras, choice }: Data,
   stem: string,
 ): Program {
   const options = {
@@ -27,8 +35,16 @@ export function programOf(
       ...(Object.values(edits).some(({ length }) => length > 0) ? [setEdits(edits)] : []),
     ],
     calls: { ...callsOf('step', 'setParams'), setEdits },
+    remark: choice && remarkOn(choice),
     note: cameras.some(({ image }) => image) ? text('sessions.noPictures') : undefined,
   };
+}
+
+/** Returns what the model chose from the points, in a sentence for people who read the code. */
+function remarkOn({ noise, delta, lambdaSurface, lambdaExterior }: ImplicitChoice): string {
+  const values = Object.entries({ noise, delta, lambdaSurface, lambdaExterior });
+  const list = values.map(([name, value]) => `${name} ${Number(value.toPrecision(3))}`).join(', ');
+  return text('reconstruct.chosenInCode', { list });
 }
 
 /** Returns computed points as text, three coordinates a line; refuses if they are of a file, which the code reads. */

@@ -24,6 +24,12 @@ export interface CloudExample {
   credit: string;
 }
 
+/**
+ * The paper's values of the parameters that the method chooses from the points by default. Examples, figures, and links and
+ * sessions from before it did rely on them.
+ */
+export const PAPER: ParamValues = { delta: 5, lambdaSurface: 0.001, lambdaExterior: 2, sides: 'outside' };
+
 const SPOT = text('reconstructPresets.spotCredit');
 
 /** The examples of the Reconstruct lab. The first one opens by default. */
@@ -36,7 +42,7 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
     up: 'y',
     front: -1,
     keepComponents: 1,
-    params: {},
+    params: PAPER,
     color: 'own',
     credit: `${SPOT} ${text('reconstructPresets.spotStereoCredit')}`,
   },
@@ -47,7 +53,7 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
     photographs: 'spot',
     up: 'y',
     front: -1,
-    params: {},
+    params: PAPER,
     color: 'own',
     credit: `${SPOT} ${text('reconstructPresets.spotCarvedCredit')}`,
   },
@@ -56,7 +62,7 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
     name: text('reconstructPresets.angelName'),
     source: { file: 'angel.ply' },
     up: 'z',
-    params: {},
+    params: PAPER,
     color: 'plain',
     credit: text('reconstructPresets.angelCredit'),
   },
@@ -65,7 +71,7 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
     name: text('reconstructPresets.torusName'),
     source: { shape: 'torus' },
     up: 'z',
-    params: {},
+    params: PAPER,
     color: 'plain',
     credit: text('reconstructPresets.torusCredit'),
   },
@@ -74,7 +80,7 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
     name: text('reconstructPresets.twoBallsName'),
     source: { shape: 'two balls' },
     up: 'z',
-    params: {},
+    params: PAPER,
     color: 'plain',
     credit: text('reconstructPresets.twoBallsCredit'),
   },

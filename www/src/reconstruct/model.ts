@@ -1,12 +1,18 @@
 /** Builds point clouds and surface models for the requests of the Reconstruct lab's page. Used by the worker only. */
-import { type ImplicitOptions, ImplicitSurface, type PointEdits } from 'vesicle';
+import {
+  type ImplicitChoice,
+  type ImplicitOptions,
+  type ImplicitParams,
+  ImplicitSurface,
+  type PointEdits,
+} from 'vesicle';
 import startReaders, { parsePoints } from 'vesicle/import';
 import { withoutRemoved } from '../labs/picking';
 import { likewise, relativeTo } from '../placing';
 import type { PointArray, Vec3 } from '../protocol';
 import { computedCloud } from './clouds';
 import { distances, span } from './nearest';
-import type { CameraView, Cloud, CloudSource, Edits, Fit, PointQuantity, Setup } from './protocol';
+import type { CameraView, ChosenParams, Cloud, CloudSource, Edits, Fit, PointQuantity, Setup } from './protocol';
 
 /** Least number of voxels along each side of the grid on which the fitted function is exported as a volume. */
 const LEAST_DIM = 8;
@@ -104,20 +110,40 @@ export function cubicDims(points: PointArray, size: number): Vec3 {
   return sides.map((side) => Math.max(LEAST_DIM, Math.round((size * side) / longest))) as Vec3;
 }
 
+/** Returns what the model chose from the points; undefined before that, and if no parameter is automatic. */
+export function choiceIn({ params, choice }: ImplicitSurface): ImplicitChoice | undefined {
+  return Object.values(params).includes('auto') ? choice : undefined;
+}
+
+/** Returns the values in force of the parameters that may be automatic; those chosen are missing until they are. */
+export function inForce(params: ImplicitParams, choice: ImplicitChoice | undefined): Partial<ChosenParams> {
+  const value = (name: keyof ChosenParams) => {
+    const given = params[name];
+    const known = typeof given === 'number' ? given : choice?.[name];
+    return known === undefined ? {} : { [name]: known };
+  };
+  const delta = params.kernel === 'multi-order' ? value('delta') : {};
+  return { ...delta, ...value('lambdaSurface'), ...value('lambdaExterior') };
+}
+
 /**
  * Collects the facts about the fitted model that the page displays. `residual` is the relative error of the solution;
  * point-to-surface distances are included only if the surface is `complete`.
  */
 export function fitOf(model: ImplicitSurface, residual: number, complete: boolean): Fit {
-  const { surface, exterior } = model.constraints();
-  const { cell, spacing, duplicates, spuriousComponents, warning } = model;
+  const { surface, exterior, interior } = model.constraints();
+  const { cell, spacing, duplicates, outliers, spuriousComponents, choice, warning } = model;
   return {
     ...(complete && { fitness: model.fitness() }),
     surfaceConstraints: surface.length / 3,
     exteriorConstraints: exterior.length / 3,
+    interiorConstraints: interior.length / 3,
+    ...(choice && { choice }),
+    inForce: inForce(model.params, choice),
     cell,
     spacing,
     duplicates,
+    outliers,
     spuriousComponents,
     residual,
     ...(warning !== undefined && { warning }),

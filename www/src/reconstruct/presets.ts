@@ -4,7 +4,7 @@
  */
 import { text } from '../texts';
 import type { CloudViewOptions } from '../view/reconstruction';
-import { CLOUDS, type CloudExample } from './examples';
+import { CLOUDS, type CloudExample, PAPER } from './examples';
 import type { ParamValues } from './protocol';
 
 /**
@@ -79,7 +79,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     source: { shape: 'cube corner' },
     up: 'z',
     front: -1,
-    params: { kernel: 'thin-plate' },
+    params: { ...PAPER, kernel: 'thin-plate' },
     color: 'mean curvature',
     credit: text('reconstructPresets.figure2Credit'),
     paperResult: text('reconstructPresets.figure2Paper'),
@@ -119,7 +119,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     id: 'figure-3',
     name: text('reconstructPresets.figure3Name'),
     ...CARVED_COW,
-    params: {},
+    params: PAPER,
     paperResult: text('reconstructPresets.figure3Paper'),
     variants: [
       {
@@ -158,7 +158,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     name: text('reconstructPresets.figure4Name'),
     source: { shape: 'torus' },
     up: 'z',
-    params: { delta: 10, tau: 0.01 },
+    params: { ...PAPER, delta: 10, tau: 0.01 },
     color: 'plain',
     credit: text('reconstructPresets.figure4Credit'),
     paperResult: text('reconstructPresets.figure4Paper'),
@@ -198,7 +198,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     id: 'figure-5',
     name: text('reconstructPresets.figure5Name'),
     ...CARVED_COW,
-    params: { delta: 10, tau: 0.025 },
+    params: { ...PAPER, delta: 10, tau: 0.025 },
     paperResult: text('reconstructPresets.figure5Paper'),
     variants: [
       {
@@ -222,7 +222,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     name: text('reconstructPresets.figure7Name'),
     ...CARVED_COW,
     maxPoints: 20_000,
-    params: {},
+    params: PAPER,
     paperResult: text('reconstructPresets.figure7Paper'),
     variants: [
       {
@@ -247,7 +247,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     name: text('reconstructPresets.figure8Name'),
     ...STEREO_COW,
     maxPoints: 2168,
-    params: { delta: 10, tau: 0.01, lambdaSurface: 0.002 },
+    params: { ...PAPER, delta: 10, tau: 0.01, lambdaSurface: 0.002 },
     view: { constraints: true },
     paperResult: text('reconstructPresets.figure8Paper'),
     variants: [
@@ -256,14 +256,14 @@ export const CLOUD_PRESETS: CloudPreset[] = [
         name: text('reconstructPresets.figure8PictureName'),
         params: {},
         ourResult: text('reconstructPresets.figure8PictureHere'),
-        expected: { components: 1, genus: 0, meanCurvature: 3.51, fitness: 0.0214 },
+        expected: { components: 1, genus: 0, meanCurvature: 3.51, fitness: 0.00934 },
       },
       {
         id: '8l',
         name: 'λ = 0.001',
         params: { lambdaSurface: 0.001 },
         ourResult: text('reconstructPresets.figure8lHere'),
-        expected: { components: 1, genus: 1, meanCurvature: 4.23, fitness: 0.0208 },
+        expected: { components: 1, genus: 1, meanCurvature: 4.23, fitness: 0.00891 },
       },
       {
         id: '8all',
@@ -280,7 +280,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     id: 'figure-9',
     name: text('reconstructPresets.figure9Name'),
     ...STEREO_COW,
-    params: {},
+    params: PAPER,
     photo: 3,
     view: { points: false },
     paperResult: text('reconstructPresets.figure9Paper'),
@@ -299,7 +299,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     id: 'figure-10',
     name: text('reconstructPresets.figure10Name'),
     ...CARVED_COW,
-    params: { delta: 10, tau: 0.01 },
+    params: { ...PAPER, delta: 10, tau: 0.01 },
     paperResult: text('reconstructPresets.figure10Paper'),
     variants: [
       {

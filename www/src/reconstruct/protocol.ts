@@ -5,7 +5,7 @@
  * As in the Extract lab: each request gets exactly one reply, the worker sends events of its own accord, and a
  * cancellation is not an error.
  */
-import type { Fitness } from 'vesicle';
+import type { Fitness, ImplicitChoice } from 'vesicle';
 import type {
   CodeRequests,
   ExportRequest,
@@ -94,11 +94,19 @@ export interface Loaded extends Ready {
 /** A quantity computed at each vertex of the surface to colour it by; the names appear in the interface. */
 export type PointQuantity = 'mean curvature' | 'distance';
 
+/** Parameters that the method may choose from the points. */
+export type ChosenParams = Pick<ImplicitChoice, 'delta' | 'lambdaSurface' | 'lambdaExterior'>;
+
 /** Facts about the points and the fitted function that the page displays besides the measures of the mesh. */
 export interface Fit {
   fitness?: Fitness;
   surfaceConstraints: number;
   exteriorConstraints: number;
+  interiorConstraints: number;
+  /** Measures of the points, and the values chosen by them for automatic parameters; undefined until they are. */
+  choice?: ImplicitChoice;
+  /** Values in force of the parameters that may be automatic: those given, or else those chosen. */
+  inForce: Partial<ChosenParams>;
   /**
    * Edge length of the cells of the lattice on which the surface is extracted, in the points' units; 0 until it is
    * known.
@@ -110,6 +118,8 @@ export interface Fit {
    */
   spacing: number;
   duplicates: number;
+  /** Number of points that were discarded as outliers. */
+  outliers: number;
   spuriousComponents: number;
   residual: number;
   warning?: string;

@@ -10,7 +10,17 @@ import { buffersOf, type Handlers, sender, serve, Work } from '../worker/serving
 import { copySurface, emptyArrays, transferOf } from '../worker/surface-buffers';
 import { fileOf } from '../worker/volumes';
 import { pointsFile, programOf } from './code';
-import { applyEdits, buildModel, cloudFrom, cubicDims, fitOf, levelOf, toPointEdits, valuesFor } from './model';
+import {
+  applyEdits,
+  buildModel,
+  choiceIn,
+  cloudFrom,
+  cubicDims,
+  fitOf,
+  levelOf,
+  toPointEdits,
+  valuesFor,
+} from './model';
 import type {
   CameraView,
   Cloud,
@@ -71,7 +81,7 @@ class Session {
       ...{ last: this.#last, log: this.#log.log },
     }),
     code: ({ stem, edits }) => {
-      const data = { file: this.#file, cameras: this.#cameras };
+      const data = { file: this.#file, cameras: this.#cameras, choice: this.#model && choiceIn(this.#model) };
       return toCode(this.#log.log, (setup) => programOf(setup, data, stem), edits);
     },
     data: () => ({ extension: 'xyz', bytes: pointsFile(this.#file, this.#points().points) }),
@@ -271,7 +281,8 @@ class Session {
 
   #volume(size: number): Requests['volume']['reply'] {
     const model = this.#current();
-    const volume = model.toVolume(cubicDims(this.#pointsInForce(), size));
+    // Without outliers that are discarded, as the volume.
+    const volume = model.toVolume(cubicDims(model.constraints().surface, size));
     try {
       return { ...fileOf(volume), level: levelOf(model) };
     } finally {

@@ -21,9 +21,16 @@ const SMALL_POWER = 4;
 /** Value of the extra option in the list of a parameter that accepts a number as well as its named choices. */
 const NUMBER = 'number';
 
+/** Significant digits of a chosen value: more would not fit into its field. */
+const CHOSEN_DIGITS = 3;
+/** Value of a numeric parameter that the method chooses. */
+const AUTO = 'auto';
+
 interface Control {
   field: Field<FormControl>;
   show(value: unknown): void;
+  /** Shows the value that the method chose, while the parameter is automatic. */
+  showChosen?: ((value: number | undefined) => void) | undefined;
 }
 
 /** Controls for a method's parameters, generated from their specifications. */
@@ -60,6 +67,11 @@ export class ParamControls {
     }
   }
 
+  /** Shows the values that the method chose for automatic parameters; those that are missing are not known yet. */
+  showChosen(values: Record<string, number>): void {
+    for (const [name, control] of this.#controls) control.showChosen?.(values[name]);
+  }
+
   /** Hides or shows controls by parameter name; used to hide parameters that currently have no effect. */
   hide(names: Record<string, boolean>): void {
     for (const [name, hidden] of Object.entries(names)) {
@@ -75,16 +87,21 @@ export class ParamControls {
 }
 
 function controlFor(spec: ParamSpec, onChange: (value: unknown) => void): Control {
-  const { main, extra, show } = inputFor(spec, onChange);
+  const { main, extra, show, showChosen } = inputFor(spec, onChange);
   const { label, symbol, help, name } = spec;
   const unit = spec.type === 'choice' ? undefined : spec.unit;
-  return { field: new Field(main, { label, symbol, help, unit, extra, attributes: { 'data-param': name } }), show };
+  return {
+    field: new Field(main, { label, symbol, help, unit, extra, attributes: { 'data-param': name } }),
+    show,
+    showChosen,
+  };
 }
 
 interface Input {
   main: FormControl;
   extra: HTMLElement[];
   show(value: unknown): void;
+  showChosen?: ((value: number | undefined) => void) | undefined;
 }
 
 function inputFor(spec: ParamSpec, onChange: (value: unknown) => void): Input {
@@ -94,7 +111,7 @@ function inputFor(spec: ParamSpec, onChange: (value: unknown) => void): Input {
     case 'choice':
       return choice(spec, onChange);
     default:
-      return numberInput(spec, onChange);
+      return spec.choices?.includes(AUTO) ? automatic(spec, onChange) : numberInput(spec, onChange);
   }
 }
 
@@ -145,6 +162,36 @@ function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: un
     field.value = given ? typed(value) : '';
   };
   return { main, extra: [row], show: showEither };
+}
+
+/**
+ * Creates a number field for a parameter that may be automatic, with a checkbox: checked, the field shows the value that the
+ * method chose, and a number that is entered replaces it.
+ */
+function automatic(spec: ParamSpec, onChange: (value: unknown) => void): Input {
+  const { main, extra, show } = numberInput(spec, onChange);
+  const tick = h('input', { type: 'checkbox', 'aria-label': text('controls.automaticOf', { label: spec.label }) });
+  let chosen: number | undefined;
+  const update = (isAuto: boolean) => {
+    tick.checked = isAuto;
+    // Before there is a value to start from, there is none to switch to.
+    tick.disabled = isAuto && chosen === undefined;
+    if (isAuto) show(chosen === undefined ? '' : Number(chosen.toPrecision(CHOSEN_DIGITS)));
+  };
+  tick.addEventListener('change', () => onChange(tick.checked ? AUTO : chosen));
+  const row = h('label', { class: 'check automatic' }, tick, text('controls.automatic'));
+  return {
+    main,
+    extra: [row, ...extra],
+    show: (value) => {
+      if (value !== AUTO) show(value);
+      update(value === AUTO);
+    },
+    showChosen: (value) => {
+      chosen = value;
+      update(tick.checked);
+    },
+  };
 }
 
 /** Creates a number field for a parameter, with a slider beside it if the parameter's range is bounded. */
@@ -220,6 +267,7 @@ const rounded = (value: number) => Number(value.toPrecision(4));
 function scaleOf(spec: ParamSpec, min: number, max: number): 'linear' | 'log' | 'small' {
   if (spec.scale === 'log' && min > 0) return 'log';
   const { default: usual } = spec;
-  const small = min === 0 && typeof usual === 'number' && usual > 0 && usual < SMALL_SHARE * max;
+  const isSmall = typeof usual === 'number' ? usual > 0 && usual < SMALL_SHARE * max : usual === AUTO;
+  const small = min === 0 && isSmall;
   return small && spec.type === 'number' ? 'small' : 'linear';
 }

@@ -15,6 +15,7 @@ const OF_RESULTS: readonly string[] = [
   'handles',
   'no-boundary',
   'self-intersecting',
+  'outliers',
   'small-object',
   'thin-label',
   'thin-parts',

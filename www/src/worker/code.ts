@@ -28,6 +28,8 @@ export interface Program {
   mesh?: string;
   /** Part of the run that the code lacks, in a sentence. */
   note?: string | undefined;
+  /** Facts that a reader of the code may want to know, in a sentence. */
+  remark?: string | undefined;
 }
 
 /** Returns statements for calls of methods that take the logged value as it is. */
@@ -96,7 +98,7 @@ export function toCode<Setup>(
   const imported = [...new Set([...names, ...(edits.length > 0 ? ['Mesh'] : [])])].sort().join(', ');
   const code = [
     `// A run of Vesicle ${version()}, to be repeated with the same version of the package for the same bits.`,
-    ...(program.note ? [`// ${program.note}`] : []),
+    ...[program.note, program.remark].filter(Boolean).map((line) => `// ${line}`),
     `import init, { ${imported} } from 'vesicle';`,
     ...imports,
     '',

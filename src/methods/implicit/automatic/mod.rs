@@ -1,5 +1,5 @@
-//! The choices of an implicit surface, from its points, where the parameters leave it any: λ and δ by their density and
-//! noise, and constraints on both sides of the surface.
+//! Choices of an implicit surface from its points: λ and δ by their density and noise, where the parameters are `auto`,
+//! and constraints on both sides of the surface.
 //!
 //! Points outside alone, as in the paper, hold f near −1 on one side and leave it flat on the other: where noise needs a
 //! large λ, the surface recedes. Pairs of points on both sides give f a slope.
@@ -10,6 +10,7 @@ mod winding;
 
 pub use off_surface::{OffSurface, OffSurfaceSearch};
 
+use super::solve::crowding;
 use crate::math::order::median;
 use crate::math::{Vec3, lower};
 use quadric_fit::{NEIGHBOURS, QuadricFit, fitting_grid};
@@ -42,7 +43,7 @@ pub struct Choice {
     pub noise: f64,
     /// Number of points on a unit of area.
     pub density: f64,
-    /// λ of constraints on the surface.
+    /// λ of constraints on the surface, as it would be given: it is multiplied for more than 3,000 points.
     pub lambda_surface: f64,
     /// λ of constraints off it.
     pub lambda_exterior: f64,
@@ -82,7 +83,7 @@ impl Choice {
         Self {
             noise,
             density,
-            lambda_surface,
+            lambda_surface: lambda_surface / crowding(count),
             lambda_exterior: bounded(SOFTNESS[0] * lambda_surface, SOFTNESS[1]),
             delta: bounded(SMOOTHNESS[0] * density.sqrt(), SMOOTHNESS[1]),
         }

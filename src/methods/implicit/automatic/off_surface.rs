@@ -29,6 +29,8 @@ const CLEARANCE: f32 = 0.8;
 const LEAST_DIFFERENCE: f32 = 0.3;
 /// Number of points where a pair is tried in a slice.
 const SLICE: usize = 60;
+/// Largest number of points outside that are compared with the winding number.
+const TESTED: usize = 500;
 /// There is a warning if less than this share of the pairs that were tried have an end on one of the sides.
 const FEW: f64 = 0.15;
 /// Difference of the winding number from ½ at a position above which normals are inconsistent, and the share of such positions
@@ -59,6 +61,11 @@ impl OffSurface {
         let fewest = self.outside.len().min(self.inside.len()) as f64;
         fewest < FEW * self.tried as f64 || self.inconsistent > INCONSISTENT
     }
+
+    /// Returns the points with inside and outside exchanged.
+    pub fn exchanged(self) -> Self {
+        Self { outside: self.inside, inside: self.outside, ..self }
+    }
 }
 
 /// The search for points off the surface.
@@ -82,7 +89,7 @@ pub struct OffSurfaceSearch {
 impl OffSurfaceSearch {
     /// Starts for the points of `samples`; `seed` determines where pairs are tried.
     pub fn new(samples: &Samples, seed: u64) -> Self {
-        let Samples { cloud, spacing, choice } = samples;
+        let Samples { cloud, spacing, choice, .. } = samples;
         let (points, spacing) = (&cloud.points, *spacing);
         let offset = (NOISE * choice.noise).max((OFFSET * spacing).min(MAX_OFFSET));
         let grid = fitting_grid(points, spacing);
@@ -123,6 +130,14 @@ impl OffSurfaceSearch {
             self.try_pair(self.at[k]);
         }
         (self.found.tried == self.at.len()).then(|| std::mem::take(&mut self.found))
+    }
+
+    /// Returns the share of `points` that are outside by the winding number, of at most [`TESTED`] of them; 1 without points.
+    pub fn outside_share(&self, points: &[Vec3]) -> f64 {
+        let tested = points.iter().step_by(points.len().div_ceil(TESTED).max(1));
+        let (outside, all) = tested
+            .fold((0, 0), |(outside, all), &p| (outside + i32::from(self.winding.at(p) < 0.5), all + 1));
+        if all == 0 { 1.0 } else { f64::from(outside) / f64::from(all) }
     }
 
     /// Returns the share that is done.

@@ -39,18 +39,13 @@ impl Constraints {
         }
     }
 
-    /// Returns a given λ of surface constraints for their number: from 3,000 on, it grows in proportion to that, so that more
-    /// points give a better surface and not a rougher one.
-    pub fn crowded(&self, lambda: f64) -> f64 {
-        let crowd = self.surface as f64 / USUAL_POINTS;
-        if crowd > 1.0 { lambda * crowd } else { lambda }
-    }
-
-    /// Sets the regularisation λ: `surface` divided by the confidence for surface constraints, `outside` for all others.
-    pub fn regularize(&mut self, surface: f64, outside: f64) {
+    /// Sets the regularisation λ: `surface` times [`crowding`] divided by the confidence for surface constraints,
+    /// `off_surface` for all others.
+    pub fn regularize(&mut self, surface: f64, off_surface: f64) {
+        let surface = surface * crowding(self.surface);
         for (i, lambda) in self.lambda.iter_mut().enumerate() {
             let sure = self.confidence.as_ref().and_then(|all| all.get(i)).map_or(1.0, |&c| f64::from(c));
-            *lambda = if i < self.surface { surface / sure } else { outside };
+            *lambda = if i < self.surface { surface / sure } else { off_surface };
         }
     }
 
@@ -75,6 +70,13 @@ impl Constraints {
         let terms = self.lambda.iter().zip(&solution.weights).take(self.surface);
         -terms.map(|(lambda, w)| lambda * w).sum::<f64>() / self.surface as f64
     }
+}
+
+/// Returns the factor of the λ of `count` surface constraints: from 3,000 on, λ grows in proportion to their number, so that
+/// more points give a better surface and not a rougher one.
+pub fn crowding(count: usize) -> f64 {
+    let crowd = count as f64 / USUAL_POINTS;
+    if crowd > 1.0 { crowd } else { 1.0 }
 }
 
 /// Number of surface constraints for which the usual values of λ are meant (Dinh, Turk & Slabaugh, section VI-B); with

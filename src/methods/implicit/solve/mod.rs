@@ -14,7 +14,7 @@ mod hierarchical;
 mod precondition;
 mod system;
 
-pub use constraints::Constraints;
+pub use constraints::{Constraints, crowding};
 
 use super::kernel::Kernel;
 use crate::math::vectors::norm;
@@ -325,7 +325,7 @@ mod tests {
         let far: Vec<Vec3> = sizes.map(&mut point).collect();
         let confidence = confidence.then(|| (0..count).map(|i| 0.02 + (i % 50) as f32 / 51.0).collect());
         let mut constraints = Constraints::new(&Cloud { points, confidence, ..Cloud::default() }, &far, &[]);
-        constraints.regularize(constraints.crowded(surface), outside);
+        constraints.regularize(surface, outside);
         constraints
     }
 
@@ -498,7 +498,7 @@ mod tests {
             let cloud = Cloud { points, ..Cloud::default() }.distinct();
             let outside: Vec<Vec3> = (0..16).map(|_| (direction(&mut random) * 2.0).as_vec3()).collect();
             let mut constraints = Constraints::new(&cloud, &outside, &[]);
-            constraints.regularize(constraints.crowded(0.001), 2.0);
+            constraints.regularize(0.001, 2.0);
             assert_eq!(constraints.shared_centre(), None);
             for kernel in kernels(constraints.radius()) {
                 let (solution, _) = solved(&constraints, kernel, 1e-6);
@@ -533,7 +533,7 @@ mod tests {
         let mut far: Vec<Vec3> = outside.iter().skip(3).copied().collect();
         far.push((direction(&mut random) * 1.3).as_vec3());
         let mut changed = Constraints::new(&Cloud { points, ..Cloud::default() }, &far, &[]);
-        changed.regularize(changed.crowded(base.lambda[0]), base.lambda[base.surface]);
+        changed.regularize(base.lambda[0], base.lambda[base.surface]);
         changed
     }
 
