@@ -4,10 +4,10 @@ use super::common::skins::{assert_sound, ball, turned};
 use super::common::{Named, Random, assert_at_least, seeds};
 use vesicle::math::{DVec3, Vec2, Vec3};
 use vesicle::mesh::{Mesh, TriangleMesh, intersecting_pairs, measure, shapes};
-use vesicle::methods::{MethodError, StepReport};
 use vesicle::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, Support,
 };
+use vesicle::methods::{MethodError, StepReport};
 use vesicle::spatial::{SurfaceWalker, surface_distance};
 use vesicle::warning::WarningCode;
 #[cfg(target_arch = "wasm32")]
@@ -294,6 +294,29 @@ fn parts_that_intersect_as_given_go_on_to_with_a_warning() {
     let pairs = intersecting_pairs(&surface);
     assert!(pairs.iter().all(|&[s, t]| is_third(s) == is_third(t)), "the third is intersected");
     assert_eq!(codes(&back_to(&mut model, &start)), [WarningCode::SelfIntersecting]);
+    assert!(model.surface().positions == shapes::joined(&parts).positions);
+}
+
+/// Two boxes that touch: what is added on the face of one is not taken for a part of the other.
+#[test]
+fn parts_that_touch_as_given_can_be_parted() {
+    let parts =
+        [shapes::cuboid(Vec3::splat(2.0)), moved(shapes::cuboid(Vec3::new(2.0, 1.0, 1.0)), Vec3::X * 2.0)];
+    let start = vec![ball(0.0, 0.0, 0.0, 0.8), ball(2.0, 0.0, 0.0, 0.4)];
+    let options = MultiresOptions {
+        detail: Some(shapes::joined(&parts)),
+        ellipsoids: start.clone(),
+        support: Support::Surface,
+        ..Default::default()
+    };
+    let mut model = MultiresolutionModel::new(options).unwrap();
+    let mut moved = start.clone();
+    moved[0].center[0] = -0.4;
+    model.set_ellipsoids(&moved).unwrap();
+    let codes = |report: &StepReport| report.warnings.iter().map(|w| w.code).collect::<Vec<_>>();
+    assert_eq!(codes(&settle(&mut model)), [WarningCode::SelfIntersecting]);
+    assert!((model.ellipsoids()[0].center[0] + 0.4).abs() < 1e-9);
+    back_to(&mut model, &start);
     assert!(model.surface().positions == shapes::joined(&parts).positions);
 }
 

@@ -36,11 +36,17 @@ impl Handle {
 
     /// Returns whether the pose is that at rest, but for rounding.
     pub fn is_at_rest(&self) -> bool {
+        self.deviation() <= ROUNDING
+    }
+
+    /// Returns how far the pose is from that at rest: the largest of the shift, in shortest semi-axes, the turn and the
+    /// stretch; only for comparison.
+    pub fn deviation(&self) -> f64 {
         let (now, rest) = (&self.now, &self.rest);
         let shift = now.center.distance(rest.center) / rest.shortest_axis();
         let turn = (0..3).map(|k| now.rotation.col(k).distance(rest.rotation.col(k))).fold(shift, f64::max);
         let stretch = (now.lengths / rest.lengths - 1.0).abs().max_element();
-        turn.max(stretch) <= ROUNDING
+        turn.max(stretch)
     }
 
     pub fn is_valid(&self) -> bool {

@@ -42,8 +42,8 @@ const LEAST_BLOCKED: usize = 20;
 /// Length of a step of the smallest handles, as a share of their largest reach: nothing has to follow them from outside.
 const STEP: f64 = 0.15;
 
-/// Number of attempts at a step of the handles, each half as long as the one before.
-const ATTEMPTS: u32 = 3;
+/// Largest number of times that the step of the handles is halved where the surface cannot follow, before they stop.
+const MOST_HALVINGS: u32 = 2;
 
 /// Number of vertices added to the given surface after which no more edges are halved: needles take many.
 const MOST_ADDED: usize = 15_000;
@@ -80,6 +80,8 @@ pub(super) struct Held {
     pub is_unsettled: bool,
     /// Whether handles stopped before the targets that were set last.
     has_stopped: bool,
+    /// Number of times that the next step of the handles is halved: one attempt a frame, so that none takes long.
+    halvings: u32,
     crossings: Crossings,
 }
 
@@ -90,6 +92,7 @@ pub(super) struct SavedHandles {
     distances: Vec<f32>,
     is_unsettled: bool,
     has_stopped: bool,
+    halvings: u32,
 }
 
 impl Held {
@@ -122,6 +125,7 @@ impl Held {
             distances: Vec::new(),
             is_unsettled: false,
             has_stopped: false,
+            halvings: 0,
             crossings: Crossings::of(walker.mesh()),
         };
         for ellipsoid in ellipsoids {
@@ -242,9 +246,12 @@ impl Held {
         surface: &SurfaceWalker,
         guard: &mut Embedding,
         longest: f32,
+        returns: bool,
     ) -> Option<(usize, f64)> {
         if !self.is_at_rest() {
-            return self.advance(now, surface, guard, longest);
+            let most = (MOST_BLOCKED * now.mesh.vertex_count() as f64) as usize;
+            let most = if returns { usize::MAX } else { most.max(LEAST_BLOCKED) };
+            return self.advance(now, surface, guard, longest, most);
         }
         let mesh = replacement(self.start.mesh.clone(), &now.mesh);
         *now = Placed { mesh, ..self.start.clone() };
@@ -254,23 +261,23 @@ impl Held {
 
     /// Moves the surface to where the handles move it, as far as it does not intersect itself, and halves edges longer than
     /// `longest` where they have stretched it. Returns the number of halved edges, and the root mean square of the
-    /// displacements, in units of the mesh; `None`, with nothing moved, if much of the surface cannot follow.
+    /// displacements, in units of the mesh; `None`, with nothing moved, if more than `most` vertices cannot follow.
     fn advance(
         &mut self,
         now: &mut Placed,
         surface: &SurfaceWalker,
         guard: &mut Embedding,
         longest: f32,
+        most: usize,
     ) -> Option<(usize, f64)> {
         let targets: Vec<Vec3> =
             (0..now.mesh.slots()).map(|i| self.target(now, VertexId::from_index(i))).collect();
         let mut displacements = displacements_to(&now.mesh, &targets);
         guard.sync_with_edge(&now.mesh, self.edge);
         self.crossings.exempt_from(guard, &now.points);
-        let most = (MOST_BLOCKED * now.mesh.vertex_count() as f64) as usize;
         let moving: Vec<VertexId> =
             now.mesh.vertices().filter(|v| displacements[v.index()] != Vec3::ZERO).collect();
-        guard.move_some_unless(&mut now.mesh, &moving, &mut displacements, most.max(LEAST_BLOCKED))?;
+        guard.move_some_unless(&mut now.mesh, &moving, &mut displacements, most)?;
         let is_stretched = |now: &Placed, u: VertexId, v: VertexId| {
             let [p, q] = [u, v].map(|end| now.points[end.index()].point);
             let length = targets[u.index()].distance(targets[v.index()]);
@@ -292,21 +299,23 @@ impl Held {
             distances: self.distances.clone(),
             is_unsettled: self.is_unsettled,
             has_stopped: self.has_stopped,
+            halvings: self.halvings,
         }
     }
 
     /// Returns a copy with saved handles, and their distances from a surface with `slots`; `None` if they do not fit.
     pub fn restored(&self, saved: SavedHandles, slots: usize) -> Option<Self> {
-        let SavedHandles { handles, distances, is_unsettled, has_stopped } = saved;
+        let SavedHandles { handles, distances, is_unsettled, has_stopped, halvings } = saved;
         let (count, before) = (handles.len(), self.start.mesh.slots());
         let is_valid = count > 0
             && handles.iter().all(Handle::is_valid)
             && slots >= before
+            && halvings <= MOST_HALVINGS
             && distances.len() == slots * count
             && distances.iter().all(|&d| d >= 0.0);
         is_valid.then(|| {
             let start = Placed { distances: distances[..before * count].to_vec(), ..self.start.clone() };
-            Self { handles, start, distances, is_unsettled, has_stopped, ..self.clone() }
+            Self { handles, start, distances, is_unsettled, has_stopped, halvings, ..self.clone() }
         })
     }
 }
@@ -320,28 +329,40 @@ impl MultiresolutionModel {
             return Changes::default();
         };
         let before = (self.ellipsoids.clone(), held.handles.clone());
-        let mut done = None;
-        for attempt in 0..ATTEMPTS {
-            self.ellipsoids.advance_by(libm::pow(0.5, f64::from(attempt)), STEP * held.reach);
-            held.move_to(&self.ellipsoids.now());
-            lap.end("motion");
-            done = held.follow(&mut now, &self.bands.base().walker, &mut self.guard, longest);
-            lap.end("surface");
-            if done.is_some() {
-                break;
-            }
-            (self.ellipsoids, held.handles) = before.clone();
-        }
+        self.ellipsoids.advance_by(libm::pow(0.5, f64::from(held.halvings)), STEP * held.reach);
+        held.move_to(&self.ellipsoids.now());
+        // Back to where they came from, nothing stops them.
+        let closer =
+            held.handles.iter().zip(&before.1).map(|(now, before)| before.deviation() - now.deviation());
+        let returns = closer.clone().all(|by| by >= 0.0) && closer.clone().any(|by| by > 0.0);
+        lap.end("motion");
+        let done = held.follow(&mut now, &self.bands.base().walker, &mut self.guard, longest, returns);
+        lap.end("surface");
         let (splits, moved) = done.unwrap_or_default();
-        if done.is_none() {
-            self.ellipsoids.stop();
-            (held.is_unsettled, held.has_stopped) = (false, true);
+        if done.is_some() {
+            held.halvings = held.halvings.saturating_sub(1);
+        } else {
+            (self.ellipsoids, held.handles) = before;
+            self.halve_or_stop(&mut held);
         }
         self.residual = moved / self.model_params.target();
         self.put_placed(now, held);
         self.show_held();
         lap.end("detail");
         Changes { creations: splits as u32, ..Changes::default() }
+    }
+
+    /// After a step that the surface could not follow, has the next be half as long, or if it is short already, stops the
+    /// handles.
+    fn halve_or_stop(&mut self, held: &mut Held) {
+        let have_arrived = self.ellipsoids.have_arrived();
+        if !have_arrived && held.halvings < MOST_HALVINGS {
+            held.halvings += 1;
+            return;
+        }
+        held.is_unsettled = false;
+        held.has_stopped |= !have_arrived;
+        self.ellipsoids.stop();
     }
 
     /// Shows the surface as given if all handles have their poses at rest, else as they have moved it.
@@ -435,6 +456,14 @@ fn with_column(rows: &[f32], count: usize, column: &[f32]) -> Vec<f32> {
     column.iter().enumerate().flat_map(row).collect()
 }
 
+/// Returns the middle of an edge between two points of a surface, on the same component: others may touch it there.
+fn middle_of(ends: [BasePoint; 2], surface: &SurfaceWalker) -> BasePoint {
+    let [p, q] = ends.map(|end| end.point);
+    let found = ends.map(|end| surface.walk(end.triangle, (p + q) * 0.5));
+    let found = if found[1].distance < found[0].distance { &found[1] } else { &found[0] };
+    BasePoint::at(surface, found.triangle, found.barycentric)
+}
+
 /// Halves all edges that `is_long` once, longest first, by `split`, which may refuse; returns their number. New vertices are
 /// in the middle of the edges, and on the given surface in the middle of the places of their ends: an edge is always on one
 /// of its triangles.
@@ -456,11 +485,9 @@ fn halve_edges(
         }
         let middle = (now.mesh.position(u) + now.mesh.position(v)) * 0.5;
         let Ok(w) = split(&mut now.mesh, u, v, middle) else { continue };
-        let [p, q] = [u, v].map(|end| now.points[end.index()].point);
-        let found = surface.closest((p + q) * 0.5);
+        let ends = [u, v].map(|end| now.points[end.index()]);
         now.points.resize(now.mesh.slots(), UNSET);
-        now.points[w.index()] =
-            found.map_or(UNSET, |found| BasePoint::at(surface, found.triangle, found.barycentric));
+        now.points[w.index()] = middle_of(ends, surface);
         let count = now.distances.len() / (now.mesh.slots() - 1).max(1);
         let mean =
             |k: usize| 0.5 * (now.distances[u.index() * count + k] + now.distances[v.index() * count + k]);

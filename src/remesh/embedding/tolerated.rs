@@ -31,7 +31,8 @@ impl Tolerated {
             return;
         }
         let (pairs, _) = intersecting.as_chunks::<6>();
-        *intersecting = pairs.iter().filter(|pair| !self.may_intersect(pair[0], pair[3])).flatten().copied().collect();
+        *intersecting =
+            pairs.iter().filter(|pair| !self.may_intersect(pair[0], pair[3])).flatten().copied().collect();
     }
 
     fn may_intersect(&self, u: VertexId, v: VertexId) -> bool {
