@@ -94,6 +94,9 @@ const whole = (text: string, steps = [{ id: 'a' }]) =>
 test('what would keep the page busy is refused', () => {
   expect(whole(`# T\n\n## S\n${'$x$ '.repeat(600)}`).steps).toHaveLength(1);
   expect(() => whole(`# T\n\n## S\n${'$x$ '.repeat(15_000)}`)).toThrow('at most 600 formulas');
+  const row = `${'|a'.repeat(20)}|\n`;
+  const table = `# T\n\n## S\n${row}${'|-'.repeat(20)}|\n${row.repeat(2_000)}`;
+  expect(() => whole(table)).toThrow('at most 5000 cells of tables');
   expect(() => whole(`# T\n\n## S\n$$${'x'.repeat(2000)}$$`)).toThrow('characters in a formula');
   expect(() => whole('# T\n\n## S\n'.padEnd(250_000))).toThrow('at most 200000 characters');
   const ids = Array.from({ length: 101 }, (_, k) => ({ id: `s${k}` }));

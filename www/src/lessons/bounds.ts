@@ -11,6 +11,8 @@ const MOST_NESTED = 40;
 const MOST_FORMULAS = 600;
 const MOST_OF_FORMULA = 1_000;
 const MOST_OF_FORMULAS = 40_000;
+/** Most cells of tables, as bars between them: laying out 46,000 takes ten seconds. */
+const MOST_CELLS = 5_000;
 
 /** Formulas that define commands: a line of them can stand for megabytes. */
 const DEFINITION = /\\(?:[egx]?def|(?:future)?let|(?:re|provide)?newcommand|providecommand|renewcommand|global|long)\b/;
@@ -29,7 +31,7 @@ export function checkSteps(file: string, steps: number): void {
   if (steps > MOST_STEPS) throw tooMuch(file, text('lessons.stepCount'), MOST_STEPS);
 }
 
-/** Throws an Error if a text is too long, or has too many formulas, or too long ones. */
+/** Throws an Error if a text is too long, or has too many formulas, too long ones, or too large tables. */
 export function checkText(file: string, source: string): void {
   checkLength(file, source);
   let [count, length] = [0, 0];
@@ -40,6 +42,7 @@ export function checkText(file: string, source: string): void {
   }
   if (count > MOST_FORMULAS) throw tooMuch(file, text('lessons.formulas'), MOST_FORMULAS);
   if (length > MOST_OF_FORMULAS) throw tooMuch(file, text('lessons.formulasCharacters'), MOST_OF_FORMULAS);
+  if (source.split('|').length > MOST_CELLS) throw tooMuch(file, text('lessons.cells'), MOST_CELLS);
 }
 
 /** Returns whether a formula is typeset; others are shown as their source. */
