@@ -387,6 +387,9 @@ export class DeformableModel implements Stepper {
   /**
    * Changes any subset of the parameters of the live model. All values are validated before any is set.
    *
+   * With `start: 'contour'`, a new iso value whose surface is more than four voxels away from a tenth of the vertices begins
+   * the run again on the contour of that value: the same settings give the same surface, however they were reached.
+   *
    * @throws {@link VesicleError} `invalid-argument` naming the parameter that is misspelled, of the wrong type or out
    *   of range; `too-large`. Nothing has changed then.
    */

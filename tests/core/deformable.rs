@@ -9,7 +9,8 @@ use vesicle::methods::deformable::{
     Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Start, Topology,
 };
 use vesicle::methods::{MethodError, StepReport};
-use vesicle::volume::{Volume, Voxels};
+use vesicle::spatial::surface_distance;
+use vesicle::volume::{Volume, VolumeInit, Voxels};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -688,4 +689,55 @@ fn oscillations_in_a_noisy_image_converge() {
     let iterations = model.step().unwrap().iteration - before;
     assert!(iterations <= 150, "done after {iterations}");
     assert_eq!(count_self_intersections(&model.mesh().to_triangles()), 0);
+}
+
+/// Two bright balls in a dim one.
+fn nested() -> Volume {
+    let value = |p: Vec3| {
+        let inside = |centre: f32, radius: f32| {
+            let away = Vec3::new(p.x - centre, p.y - 19.5, p.z - 19.5).length();
+            (0.5 + 0.5 * (radius - away)).clamp(0.0, 1.0)
+        };
+        0.3 * inside(19.5, 16.0) + 0.7 * inside(12.5, 4.0).max(inside(26.5, 4.0))
+    };
+    let at = |i: usize| Vec3::new((i % 40) as f32, (i / 40 % 40) as f32, (i / 1600) as f32);
+    Volume::new(VolumeInit::new(
+        Voxels::F32((0..40 * 40 * 40).map(|i| value(at(i))).collect()),
+        [40, 40, 40, 1],
+    ))
+    .unwrap()
+}
+
+#[test]
+fn an_iso_value_far_from_the_last_gives_the_surface_that_it_has() {
+    let volume = nested();
+    let options = |iso: f64| DeformableOptions {
+        params: Some(DeformableParams { iso, ..DeformableParams::for_volume(&volume) }),
+        levels: 1,
+        ..Default::default()
+    };
+    let finished = |iso: f64| surface_of(&volume, options(iso)).0;
+    let (dim, bright) = (finished(0.15), finished(0.65));
+    let mut model = finished(0.15);
+    for (iso, expected) in [(0.65, &bright), (0.15, &dim)] {
+        let before = model.step().unwrap().iteration;
+        model.set_params(DeformableParams { iso, ..model.params().clone() }).unwrap();
+        let report = run(&mut model, 400);
+        assert!(report.done && report.iteration - before < 100, "{report:?}");
+        assert_eq!(report.components, expected.mesh().component_count() as u32);
+        let apart = surface_distance(&model.surface(), &expected.surface()).unwrap();
+        assert!(apart.hausdorff < 0.02, "{iso}: {}", apart.hausdorff);
+    }
+    // A near one is reached by moving.
+    let surface = model.surface();
+    model.set_params(DeformableParams { iso: 0.17, ..model.params().clone() }).unwrap();
+    assert!(model.surface().positions == surface.positions);
+    // One without a surface, too; and what is refused changes nothing.
+    let state = model.save();
+    assert!(
+        model.set_params(DeformableParams { iso: 0.65, damping: -1.0, ..model.params().clone() }).is_err()
+    );
+    assert!(model.save() == state);
+    model.set_params(DeformableParams { iso: 5.0, ..model.params().clone() }).unwrap();
+    assert!(run(&mut model, 400).done);
 }

@@ -64,6 +64,7 @@ mod domain;
 mod forces;
 mod image;
 mod image_guide;
+mod jump;
 mod motion;
 mod params;
 mod patch;
@@ -87,7 +88,6 @@ use crate::math::{DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId, grid_origin};
 use crate::remesh::{Changes, Resolver, Sampling};
 use crate::volume::Volume;
-use contour::ObjectIs;
 use domain::Domain;
 use forces::{Field, ForceScale, LocalAttractor};
 use image::Pyramid;
@@ -188,6 +188,20 @@ struct Keys {
     size: ScalarKey,
 }
 
+impl Keys {
+    /// Adds the attributes to a start mesh.
+    fn added_to(mesh: &mut Mesh) -> Self {
+        Self {
+            velocity: mesh.add_vector(),
+            checked_position: mesh.add_vector(),
+            still_iterations: mesh.add_scalar(),
+            since_edit: mesh.add_scalar(),
+            reversals: mesh.add_scalar(),
+            size: mesh.add_scalar(),
+        }
+    }
+}
+
 /// The options of a model, whatever its image.
 struct Origin {
     frame: usize,
@@ -286,20 +300,7 @@ impl DeformableModel {
         let level = pyramid.levels.len() - 1;
         let delta = pyramid.delta_at(finest_delta, level);
         let domain = Domain::new(pyramid.dims(), delta);
-        let seeds = !pyramid.is_sparse() && params.seeding != Seeding::Off;
-        let context = StartContext {
-            image: &pyramid.levels[level],
-            brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(&pyramid, &params, level)),
-            iso: pyramid.iso(&params),
-            object: ObjectIs::by(&params),
-            smallest_part: params.smallest_part * pyramid.voxel(),
-            dims: pyramid.dims(),
-            domain,
-            from_world: to_world.inverse(),
-            spacing: pyramid.spacing(),
-            sampling: Sampling::new(delta),
-            may_be_empty: params.adapts_to_image() && seeds,
-        };
+        let context = StartContext::of(&pyramid, &params, domain, delta, &to_world);
         let from_contour = start == Start::Contour;
         let contour = if from_contour { contour_mesh(&context)? } else { None };
         let begins_on_contour = contour.is_some();
@@ -310,14 +311,7 @@ impl DeformableModel {
                 start.make(&context, |value| pyramid.normalised(value), &*guide)?
             }
         };
-        let keys = Keys {
-            velocity: mesh.add_vector(),
-            checked_position: mesh.add_vector(),
-            still_iterations: mesh.add_scalar(),
-            since_edit: mesh.add_scalar(),
-            reversals: mesh.add_scalar(),
-            size: mesh.add_scalar(),
-        };
+        let keys = Keys::added_to(&mut mesh);
         let mut model = Self {
             to_world,
             frame,
@@ -345,17 +339,23 @@ impl DeformableModel {
             refreshed: Changes::default(),
             clock: || 0.0,
         };
-        model.watch_output();
-        model.prepare_level()?;
-        if begins_on_contour {
-            model.resolve_contour()?
-        } else {
-            model.reorder()
-        }
-        model.mark_checked();
-        // No edit has displaced vertices recently.
-        model.mesh.scalar_mut(keys.since_edit).fill(motion::ITERATIONS_AFTER_EDIT);
+        model.begin_on(begins_on_contour)?;
         Ok(model)
+    }
+
+    /// Prepares a start mesh for the first iteration.
+    fn begin_on(&mut self, contour: bool) -> Result<(), MethodError> {
+        self.watch_output();
+        self.prepare_level()?;
+        if contour {
+            self.resolve_contour()?
+        } else {
+            self.reorder()
+        }
+        self.mark_checked();
+        // No edit has displaced vertices recently.
+        self.mesh.scalar_mut(self.keys.since_edit).fill(motion::ITERATIONS_AFTER_EDIT);
+        Ok(())
     }
 
     /// Runs one iteration of the paper's figure 9: moves the vertices, then restores edge bounds and resolves contacts
@@ -549,13 +549,18 @@ impl DeformableModel {
         }
     }
 
-    /// Replaces all parameters from the next step on, and wakes all sleeping vertices; a finished run continues.
+    /// Replaces all parameters from the next step on, and wakes all sleeping vertices; a finished run continues. A run that
+    /// began on the contour begins again on that of a new iso value, if the surface of that is more than four voxels away
+    /// from a tenth of the vertices.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for values out of range, [`MethodError::Volume`] if the gradient image does not
-    /// fit into memory; nothing is changed then.
+    /// fit into memory, those of [`Self::new`] if the run begins again; nothing is changed then.
     pub fn set_params(&mut self, params: DeformableParams) -> Result<(), MethodError> {
         self.check_params(&params)?;
+        if self.jumps_with(&params) {
+            return self.begin_again(params);
+        }
         let adapted = self.pyramid.adapted(&params)?;
         let image = adapted.map(|adapted| std::mem::replace(&mut self.pyramid, adapted));
         let before = std::mem::replace(&mut self.params, params);

@@ -2,8 +2,8 @@
 
 use super::contour::{ObjectIs, contour, placed, simplified};
 use super::domain::{Domain, rounded_axes};
-use super::image::LevelImage;
-use super::{DeformableModel, image_guide};
+use super::image::{LevelImage, Pyramid};
+use super::{DeformableModel, DeformableParams, Seeding, coarse, image_guide};
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections};
 use crate::methods::MethodError;
@@ -62,7 +62,32 @@ pub(super) struct StartContext<'a> {
     pub(super) may_be_empty: bool,
 }
 
-impl StartContext<'_> {
+impl<'a> StartContext<'a> {
+    /// Returns the context of a start on the coarsest level of a pyramid, where the lower edge bound is `delta`.
+    pub(super) fn of(
+        pyramid: &'a Pyramid,
+        params: &DeformableParams,
+        domain: Domain,
+        delta: f32,
+        to_world: &DAffine3,
+    ) -> Self {
+        let level = pyramid.levels.len() - 1;
+        let seeds = !pyramid.is_sparse() && params.seeding != Seeding::Off;
+        Self {
+            image: &pyramid.levels[level],
+            brighter_than: (params.iso_force < 0.0).then(|| coarse::iso(pyramid, params, level)),
+            iso: pyramid.iso(params),
+            object: ObjectIs::by(params),
+            smallest_part: params.smallest_part * pyramid.voxel(),
+            dims: pyramid.dims(),
+            domain,
+            from_world: to_world.inverse(),
+            spacing: pyramid.spacing(),
+            sampling: Sampling::new(delta),
+            may_be_empty: params.adapts_to_image() && seeds,
+        }
+    }
+
     fn most_vertices(&self) -> usize {
         self.domain.most_vertices(self.sampling.shortest())
     }
