@@ -141,7 +141,7 @@ test('the code of random gestures gives the same surfaces, of a surface that hol
   for (const seed of [7, 8, 9])
     made.push(await interactiveRun(seed, source(), { edgeMin: 0.1, edgeMax: 0.3 }, 'surface'));
   await programs.expectSame(made, []);
-  // Built anew with the other support, and back.
+  // Recomputed with the other support, and back.
   const setup = { start: undefined, params: PARAMS, pose: undefined };
   const membrane = await worker.request('rebuild', { ...setup, support: 'membrane' });
   const surface = await worker.request('rebuild', { ...setup, support: 'surface' });

@@ -372,7 +372,7 @@ describe('a file', () => {
     ])
       expect(Number(found) / Number(given)).toBeCloseTo(1, 6);
     expect(await hash()).toBe('#sculpt?file=slab.ply&support=surface');
-    // What has no effect is not shown.
+    // Controls without effect are not shown.
     await app.page.evaluate(() =>
       document.querySelectorAll('details').forEach((one) => {
         one.open = true;

@@ -26,7 +26,7 @@ export interface LinkedScene {
   file?: string;
   params: ParamValues;
   /**
-   * What supports the surface of a file; links of versions that knew only the membrane do not say so. Undefined for
+   * Support of the surface of a file; links of versions that knew only the membrane do not say so. Undefined for
    * examples.
    */
   support?: Support;

@@ -31,7 +31,7 @@ export type { ControlEllipsoid, Failure, MeshTexture, NamedBytes, ParamSpec, Par
 /** All control ellipsoids of a model, in a fixed order. */
 export type Pose = ControlEllipsoid[];
 
-/** What supports a surface: itself, or a membrane over the ellipsoids as in the paper. */
+/** Support of a surface: itself, or a membrane over the ellipsoids as in the paper. */
 export type Support = 'surface' | 'membrane';
 
 /** Source of a mesh: a file with its texture, if any, or a computed shape. */
@@ -115,7 +115,7 @@ export interface FrameContents {
 /** A saved model, from which the worker can restore it; kept by the page for undo. */
 export interface SavedPose {
   state: Uint8Array;
-  /** What supports the surface; a membrane if undefined, as in sessions of earlier versions. */
+  /** Support of the surface; a membrane if undefined, as in sessions of earlier versions. */
   support?: Support | undefined;
   /** The ellipsoids with which the model was built. */
   start: Pose;
