@@ -9,6 +9,9 @@ const [HEADER, CHUNK_HEADER] = [12, 8];
 /** Largest text of a document that is parsed, in bytes; larger ones would take gigabytes. */
 const TEXT_LIMIT = 1 << 28;
 
+/** Lengths in containers have 32 bits. */
+const FILE_LIMIT = 2 ** 32 - 1;
+
 /** A document's text and, of a container, the binary chunk. */
 interface Parts {
   text: Uint8Array;
@@ -121,6 +124,7 @@ export function packed(root: Json, views: readonly Uint8Array[]): Uint8Array {
   else delete root.buffers;
   const json = new TextEncoder().encode(JSON.stringify(root));
   const binaryAt = HEADER + CHUNK_HEADER + aligned(json.length) + CHUNK_HEADER;
+  if (binaryAt + length > FILE_LIMIT) throw tooLarge('GLB', binaryAt + length);
   const bytes = new Uint8Array(length > 0 ? binaryAt + length : binaryAt - CHUNK_HEADER).fill(0x20, HEADER, binaryAt);
   const words = viewOf(bytes);
   const put = (at: number, ...values: number[]) => {

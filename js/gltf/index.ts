@@ -81,7 +81,7 @@ async function viewsOf(
   document: { root: Json; buffers: Buffers; budget: Target['budget'] },
   decoders: MeshDecoders,
 ): Promise<Uint8Array[]> {
-  const { root, buffers } = document;
+  const { root, buffers, budget } = document;
   const views = objects(root.bufferViews);
   const compressed = views.map((view) => meshoptOf(root, buffers, view));
   const decoder = compressed.some(Boolean) ? await started('meshopt', decoders, meshoptDecoder) : undefined;
@@ -91,6 +91,8 @@ async function viewsOf(
       decoder && extension
         ? decodedView(decoder, document, [view, extension], field)
         : rangeOf(root, buffers, view, field);
+    // Views may overlap, and each is written by itself.
+    if (!extension) budget(bytes.length, field);
     removeExtensions(view);
     return bytes;
   });

@@ -28,8 +28,7 @@ export function whole(value: unknown, field: string, usual?: number): number {
 
 /** Returns the entry of a table; throws `bad-file` if it has none with that index. */
 export function entry(root: Json, table: string, index: number): Json {
-  const entries = objects(root[table]);
-  const found = entries[index];
-  if (found) return found;
+  const entries = Array.isArray(root[table]) ? (root[table] as unknown[]) : [];
+  if (index < entries.length) return object(entries[index]);
   throw badGltf(table, `index ${index} is out of range; there are ${entries.length} entries`);
 }

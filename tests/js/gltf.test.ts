@@ -168,6 +168,15 @@ test('what states far more than it has takes neither time nor memory', async () 
   expect(large.code).toBe('too-large');
 });
 
+test('overlapping buffer views do not multiply a file', async () => {
+  const view = { buffer: 0, byteLength: STREAM.bytes.length };
+  const many = patched((json) => {
+    json.bufferViews.push(...Array.from({ length: 2 ** 28 / STREAM.bytes.length }, () => view));
+    json.images = json.bufferViews.map((_: object, bufferView: number) => ({ bufferView }));
+  });
+  expect((await rejection(decompressGltf(many))).code).toBe('too-large');
+});
+
 test.each([
   ['byteStride', 260, 'byteStride'],
   ['mode', 'OTHER', 'mode'],
