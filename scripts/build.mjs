@@ -46,15 +46,16 @@ const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md',
 // Adapters to third-party software: `vesicle/three` and so on.
 const ADAPTERS = ['three', 'niivue', 'vtk', 'cornerstone'];
 
-/** Packages that entry points import when they are used: of `vesicle/zarr`, of `vesicle/tiff`, and of `vesicle/dicom`. */
+/** Packages that entry points import when they are used: of `vesicle/zarr`, `vesicle/tiff`, `vesicle/gltf`, and `vesicle/dicom`. */
 const OPTIONAL_PEERS = [
   ...['zarrita', '@zarrita/storage', 'geotiff'],
+  ...['draco3dgltf', 'meshoptimizer'],
   ...['dicom-parser', '@cornerstonejs/codec-libjpeg-turbo-8bit', '@cornerstonejs/jpeg-lossless-decoder-js'],
   ...['@cornerstonejs/codec-charls', '@cornerstonejs/codec-openjpeg', '@cornerstonejs/codec-openjph'],
 ];
 
 /** Folders of `js` that are an entry point each, for formats of files that other packages help to read. */
-const FORMATS = ['dicom', 'tiff', 'zarr'];
+const FORMATS = ['dicom', 'gltf', 'tiff', 'zarr'];
 
 /**
  * Compiles a module and returns its path. The core is compiled once for all modules of a target directory with the same

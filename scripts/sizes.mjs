@@ -22,6 +22,7 @@ const ENTRIES = {
   'vesicle/vtk': 'adapters/vtk.js',
   'vesicle/cornerstone': 'adapters/cornerstone.js',
   'vesicle/dicom': 'dicom/index.js',
+  'vesicle/gltf': 'gltf/index.js',
   'vesicle/tiff': 'tiff/index.js',
   'vesicle/zarr': 'zarr/index.js',
   'vesicle/element': 'element.js',

@@ -167,10 +167,7 @@ const nameWorker = ({ facadeModuleId }: Rolldown.PreRenderedChunk) =>
   `assets/${facadeModuleId === here('src/worker.ts') ? EXTRACT_WORKER : '[name]'}-[hash].js`;
 
 /** For the notices beside the page. */
-const noted = noteBundled(
-  'app',
-  DECODERS.map(([decoder]) => `@cornerstonejs/${decoder}`),
-);
+const noted = noteBundled('app', [...DECODERS.map(([decoder]) => `@cornerstonejs/${decoder}`), 'draco3dgltf']);
 
 export default defineConfig({
   root: here('.'),
@@ -179,7 +176,7 @@ export default defineConfig({
   resolve: {
     alias: [
       { find: /^vesicle\/(three|niivue|vtk|cornerstone)$/, replacement: `${here('../pkg/adapters')}/$1.js` },
-      { find: /^vesicle\/(import|zarr|dicom|tiff)$/, replacement: `${here('../pkg')}/$1/index.js` },
+      { find: /^vesicle\/(import|zarr|dicom|gltf|tiff)$/, replacement: `${here('../pkg')}/$1/index.js` },
       { find: /^vesicle\/(\w+)$/, replacement: `${here('../pkg')}/$1.js` },
       { find: /^vesicle$/, replacement: here('../pkg') },
     ],

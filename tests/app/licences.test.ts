@@ -36,6 +36,8 @@ test('packages of the page, of its workers and beside it are listed, and no tool
     'geotiff',
     'itk-wasm',
     'dicom-parser',
+    'draco3dgltf',
+    'meshoptimizer',
     '@cornerstonejs/codec-openjpeg',
     '@niivue/niivue',
     '@kitware/vtk.js',
@@ -52,7 +54,7 @@ test('all include the text of their licence, but for those whose packages have n
     (name) => `@cornerstonejs/${name}`,
   );
   const without = blocks.filter((block) => block.includes('without the text')).flatMap(named);
-  expect(without).toEqual([...cornerstone, 'lerc']);
+  expect(without).toEqual([...cornerstone, 'draco3dgltf', 'lerc']);
   // Where several licences apply together, none may be left out.
   expect(notices).toMatch(/^unicode-ident .*AND Unicode-3\.0[^─]*UNICODE LICENSE V3/m);
 });

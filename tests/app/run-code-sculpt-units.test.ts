@@ -1,7 +1,9 @@
 /** Gestures in the Sculpt lab are repeated, to the same bits, by the code that its worker writes of them. */
 import { expect, test } from 'vitest';
-import init from '../../pkg/index.js';
+import { decompressGltf } from '../../pkg/gltf/index.js';
+import init, { Mesh, MultiresolutionModel } from '../../pkg/index.js';
 import { uniform } from '../../www/src/random';
+import { originsOf, programOf } from '../../www/src/sculpt/code';
 import { ball, moved, turned, withLengths } from '../../www/src/sculpt/ellipsoids';
 import type { Film } from '../../www/src/sculpt/film';
 import type {
@@ -14,6 +16,8 @@ import type {
   Support,
 } from '../../www/src/sculpt/protocol';
 import { globeAsObj } from '../../www/src/sculpt/shapes';
+import { toCode } from '../../www/src/worker/code';
+import { dracoGlb, dracoStream, ball as roundMesh } from '../js/made-gltf';
 import { LONG } from './long';
 import { pickFrom, programsIn } from './run-code';
 import { startWorker } from './worker-in-node';
@@ -165,4 +169,15 @@ test('a session keeps the log of the present model', async () => {
   await programs.expectSame([await worker.request('export', { format: 'ply' })], []);
   await worker.request('open', { source: {}, setup, saved });
   await expect(worker.request('code', { stem: 'mesh', edits: [] })).rejects.toThrow('not known how the run began');
+});
+
+test('code of a run with a compressed mesh decodes it', async () => {
+  const bytes = dracoGlb([dracoStream(roundMesh())]);
+  const origins = originsOf({ detail: { file: { name: 'ball.glb', bytes } } });
+  const setup = { start: [ball(0, 0, 0, 0.5)], params: {}, support: 'surface' as const };
+  const program = (given: typeof setup) => programOf(given, origins, 'run');
+  await programs.add(0, toCode({ setup, calls: [] } as never, program as never, []));
+  const mesh = Mesh.parse(await decompressGltf(bytes));
+  const model = new MultiresolutionModel({ detail: mesh, ellipsoids: setup.start });
+  await programs.expectSame([model.mesh.toBytes('ply')], [{ name: 'ball.glb', bytes }]);
 });

@@ -3,6 +3,7 @@ import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
+import { ball, dracoGlb, dracoStream } from '../js/made-gltf';
 import {
   type App,
   afterRun,
@@ -16,6 +17,10 @@ import {
 } from './browser';
 import { LONG } from './long';
 import { countPixels } from './pixels';
+
+/** A picture of one pixel. */
+const DOT =
+  'data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8z8BQDwAEhQGAhKmMIQAAAABJRU5ErkJggg==';
 
 let app: App;
 
@@ -449,6 +454,17 @@ describe('a file', () => {
     await reach(app.page, 'done');
     expect(await text('.facts dd')).toMatch(/^Globe/);
     expect(await measured()).toMatchObject({ components: 1, closed: true });
+  });
+
+  test('that is compressed with Draco opens with its texture', async () => {
+    const materials = [{ pbrMetallicRoughness: { baseColorTexture: { index: 0 } } }];
+    const bytes = dracoGlb([dracoStream(ball(0.15))], { materials, textures: [{ source: 0 }], images: [{ uri: DOT }] });
+    await openAt(SMALL, 'done');
+    await drop(app.page, [{ name: 'ball.glb', bytes }]);
+    await expect.poll(() => text('.facts dd')).toMatch(/^ball\.glb/);
+    await reach(app.page, 'done');
+    expect(await measured()).toMatchObject({ components: 1, closed: true });
+    expect(await app.page.isEnabled('[data-view=color] option[value=texture]')).toBe(true);
   });
 
   test('that is open is refused with a message, and the previous data are kept', async () => {

@@ -5,6 +5,7 @@ import { expect, test } from 'vitest';
 import { APP_POLICY, DOCS_POLICY, EXTRACT_WORKER_POLICY, WORKER_POLICY } from '../../scripts/policy.mjs';
 import { serveApp } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
+import { ball, dracoGlb, dracoStream, meshoptGlb } from '../js/made-gltf';
 import { drop, LABS, launch, open, openApp, openPage, QUICK, reach, recordStates } from './browser';
 
 const DIST = at('dist');
@@ -101,6 +102,19 @@ test('all decoders work under the policies', async () => {
     const opened = async () => (await states()).includes('running') || app.page.textContent('.banner');
     await expect.poll(opened, { message: file }).toBe(true);
   }
+  await app.close();
+});
+
+test('the decoder of Draco works under the policies', async () => {
+  const app = await openApp();
+  await open(app, QUICK.sculpt);
+  await reach(app.page, 'done');
+  await drop(app.page, [{ name: 'ball.glb', bytes: dracoGlb([dracoStream(ball())]) }]);
+  await expect.poll(() => app.page.textContent('.facts dd')).toMatch(/^ball\.glb/);
+  await reach(app.page, 'done');
+  await drop(app.page, [{ name: 'packed.glb', bytes: await meshoptGlb(ball()) }]);
+  await expect.poll(() => app.page.textContent('.facts dd')).toMatch(/^packed\.glb/);
+  expect(app.complaints.splice(0)).toEqual([]);
   await app.close();
 });
 

@@ -14,7 +14,7 @@ export default defineConfig({
   resolve: {
     alias: [
       { find: /^vesicle(\/index)?$/, replacement: at('../../pkg/index.js') },
-      { find: /^vesicle\/(import|tiff|zarr)$/, replacement: at('../../pkg/$1/index.js') },
+      { find: /^vesicle\/(import|gltf|tiff|zarr)$/, replacement: at('../../pkg/$1/index.js') },
     ],
   },
   test: {

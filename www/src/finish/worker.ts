@@ -3,6 +3,7 @@ import init, { Mesh, Volume } from 'vesicle';
 import { relativeTo } from '../placing';
 import type { NamedBytes } from '../protocol';
 import { text } from '../texts';
+import { withoutCompression } from '../worker/gltf';
 import { Refusal } from '../worker/refusal';
 import { type Handlers, reply, withTransfer } from '../worker/serving';
 import { copySurface, emptyArrays, sectionOf } from '../worker/surface-buffers';
@@ -113,7 +114,7 @@ function measure([from, to]: [SurfacePoint, SurfacePoint]): { straight: number; 
 async function readReference(files: NamedBytes[]): Promise<undefined> {
   const [file] = files;
   const isMesh = file && files.length === 1 && /\.(ply|stl|obj|glb)$/i.test(file.name);
-  const read = isMesh ? Mesh.parse(file.bytes) : new Volume(await readFiles(files));
+  const read = isMesh ? Mesh.parse(await withoutCompression(file.bytes)) : new Volume(await readFiles(files));
   reference?.free();
   reference = read;
 }

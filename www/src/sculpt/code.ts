@@ -1,4 +1,5 @@
 /** Code of the Sculpt lab's runs. */
+import { isCompressedGltf } from 'vesicle/gltf';
 import { text } from '../texts';
 import { bytesOf, callsOf, chosen, type Program } from '../worker/code';
 import { literal } from '../worker/literal';
@@ -6,15 +7,22 @@ import { Refusal } from '../worker/refusal';
 import type { MeshSource, PoseLog, SceneSource } from './protocol';
 import { BALL, type ComputedMesh, globeAsObj } from './shapes';
 
-/** Where the meshes of a model are from; a file may have the picture of its texture in another one, of the type `texture`. */
+/**
+ * Where the meshes of a model are from; a file may have the picture of its texture in another one, of the type `texture`, and
+ * be `compressed`.
+ */
 export type Origins = {
-  [Mesh in keyof SceneSource]: { file: string; texture: string | undefined } | { shape: ComputedMesh };
+  [Mesh in keyof SceneSource]:
+    | { file: string; texture: string | undefined; compressed: boolean }
+    | { shape: ComputedMesh };
 };
 
 /** Returns where meshes are from, without their bytes. */
 export function originsOf(source: SceneSource): Origins {
   const origin = (one: MeshSource) =>
-    'file' in one ? { file: one.file.name, texture: one.texture?.type } : { shape: one.shape };
+    'file' in one
+      ? { file: one.file.name, texture: one.texture?.type, compressed: isCompressedGltf(one.file.bytes) }
+      : { shape: one.shape };
   return Object.fromEntries(Object.entries(source).map(([mesh, one]) => [mesh, origin(one)]));
 }
 
@@ -33,7 +41,9 @@ export function programOf(
     if (!isBall(origin)) inputs.push(['file' in origin ? origin.file : `${stem}.obj`, mesh]);
     if (texture) inputs.push([text('sculpt.textureFile', { type: texture.slice('image/'.length) }), 'picture']);
     const options = texture ? `, { texture: { type: ${literal(texture)}, bytes: picture } }` : '';
-    const made = isBall(origin) ? `icosphere(${BALL.map(literal).join(', ')})` : `parse(${mesh}${options})`;
+    const made = isBall(origin)
+      ? `icosphere(${BALL.map(literal).join(', ')})`
+      : `parse(${bytesFor(mesh, origin)}${options})`;
     given += `${mesh}: Mesh.${made}, `;
   }
   const [files, parameters] = [inputs.map(([file]) => file), inputs.map(([, parameter]) => parameter)];
@@ -44,6 +54,7 @@ export function programOf(
   const options = literal({ ellipsoids: start, ...stated, params: chosen('multires', params) }).slice(2);
   return {
     ...(inputs.length > 0 && bytesOf(files, parameters, needs)),
+    ...(meshes.some(([, origin]) => isCompressed(origin)) && { imports: DECOMPRESSION }),
     names: ['MultiresolutionModel', ...(meshes.length > 0 ? ['Mesh'] : [])],
     begin: [`const model = new MultiresolutionModel({ ${given}${options});`],
     calls: callsOf('step', 'setParams', 'setEllipsoids'),
@@ -51,6 +62,17 @@ export function programOf(
     note: needs === 'saved' ? text('sessions.noPictures') : undefined,
   };
 }
+
+/** Lines of the code of a run with compressed meshes. */
+const DECOMPRESSION = [
+  '// Imports draco3dgltf or meshoptimizer, which have to be installed.',
+  `import { decompressGltf } from 'vesicle/gltf';`,
+];
+
+const isCompressed = (origin: Origins[keyof SceneSource]) => origin && 'file' in origin && origin.compressed;
+
+const bytesFor = (mesh: string, origin: Origins[keyof SceneSource]) =>
+  isCompressed(origin) ? `await decompressGltf(${mesh})` : mesh;
 
 const isBall = (origin: object) => 'shape' in origin && origin.shape === 'ball';
 const isGlobe = (origin: object) => 'shape' in origin && !isBall(origin);

@@ -1,6 +1,7 @@
 /** Computes the meshes of examples that have no mesh file. Used by the worker only. */
 import { Mesh, type MeshTexture } from 'vesicle';
 import startReaders, { parseMesh } from 'vesicle/import';
+import { withoutCompression } from '../worker/gltf';
 import { drawnMap } from './map';
 import type { NamedBytes } from './protocol';
 
@@ -28,7 +29,8 @@ export async function plainMesh(shape: ComputedMesh): Promise<Mesh> {
 export async function readMesh(bytes: Uint8Array, texture?: MeshTexture, files: NamedBytes[] = []): Promise<Mesh> {
   await startReaders();
   const beside = files.map(({ name, bytes }) => ({ name, bytes }));
-  const { positions, indices, ...extra } = parseMesh(bytes, { ...(texture && { texture }), files: beside });
+  const plain = await withoutCompression(bytes, files);
+  const { positions, indices, ...extra } = parseMesh(plain, { ...(texture && { texture }), files: beside });
   return Mesh.fromArrays(positions, indices, extra);
 }
 

@@ -1,0 +1,20 @@
+// Errors of compressed glTF documents.
+import { VesicleError } from '../error.js';
+import { shortened } from '../short-text.js';
+
+/** Returns the `bad-file` error whose message names the field and its problem; the caller throws it. */
+export function badGltf(field: string, problem: string): VesicleError {
+  return new VesicleError('bad-file', `glTF: ${shortened(field)}: ${shortened(problem)}`);
+}
+
+/** Returns the `too-large` error for data that would need so many bytes. */
+export function tooLarge(field: string, bytes: number): VesicleError {
+  return new VesicleError('too-large', `glTF: ${shortened(field)}: needs ${bytes} bytes, far more than its file`);
+}
+
+/** Returns what an error of another library says. */
+export function reasonOf(error: unknown): string {
+  const text = error instanceof Error ? error.message : String(error);
+  // Modules of C++ throw addresses.
+  return /^\d+$/.test(text) ? 'the decoder failed' : text.slice(0, 150);
+}
