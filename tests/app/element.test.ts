@@ -24,6 +24,7 @@ let page: Page;
 const complaints: string[] = [];
 
 beforeAll(async () => {
+  await init();
   folder = await mkdtemp(join(tmpdir(), 'vesicle-element-'));
   await cp(at('pkg'), join(folder, 'vesicle'), { recursive: true });
   const header = Buffer.from(metaImageHeader('LOCAL'));
@@ -132,7 +133,10 @@ const INVALID: [string, string | RegExp][] = [
   ['<vesicle-lab src="ring.mha" start="above"></vesicle-lab>', /^start: 'above'; accepted: contour, enclosing/],
   ['<vesicle-lab src="ring.mha" params=\'{ "isoo": 3 }\'></vesicle-lab>', /isoo/],
   ['<vesicle-lab src="bust.ply"></vesicle-lab>', /NIfTI/],
-  ['<vesicle-lab src="bust.ply" method="multires"></vesicle-lab>', /ellipsoids/],
+  [
+    `<vesicle-lab src="bust.ply" method="multires" ellipsoids='[{ "center": [0, 0, 0] }]'></vesicle-lab>`,
+    /ellipsoids\[0\]\.axes/,
+  ],
 ];
 
 test('each element with invalid attributes or data shows an error message', async () => {
@@ -162,8 +166,13 @@ test('points', async () => {
   await expect.poll(drawnPixels).toBeGreaterThan(2000);
 });
 
+test('a mesh without ellipsoids, which stays as it is', async () => {
+  await open('<vesicle-lab src="bust.ply" method="multires"></vesicle-lab>');
+  await state('done');
+  await expect.poll(drawnPixels).toBeGreaterThan(2000);
+});
+
 test('a mesh with ellipsoids, which runs without end', LONG, async () => {
-  await init();
   await writeFile(join(folder, 'ball.ply'), Mesh.icosphere([0, 0, 0], 1, 0.3).toBytes('ply'));
   const axes = [0, 1, 2].map((axis) => [0, 1, 2].map((other) => (axis === other ? 0.9 : 0)));
   const ellipsoids = JSON.stringify([{ center: [0, 0, 0], axes }]);
@@ -175,7 +184,6 @@ test('a mesh with ellipsoids, which runs without end', LONG, async () => {
 });
 
 test('a volume with frames', LONG, async () => {
-  await init();
   await writeFile(join(folder, 'beating.nii'), beating().toNifti());
   await open('<vesicle-lab src="beating.nii" method="tracking" params=\'{ "threshold": 60 }\'></vesicle-lab>');
   await state('done');
