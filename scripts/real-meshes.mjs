@@ -36,6 +36,7 @@ const distance = (a, b) => Math.hypot(...a.map((x, k) => x - b[k]));
 /** Prints a row for every mesh in a folder; returns whether all closed ones stay as given, and none intersects itself. */
 export async function reportMeshes(library, folder, line) {
   const { default: startReaders, parseMesh } = await import(at('pkg', 'import', 'index.js'));
+  const { decompressGltf } = await import(at('pkg', 'gltf', 'index.js'));
   await startReaders();
   process.stdout.write(
     line(
@@ -48,7 +49,8 @@ export async function reportMeshes(library, folder, line) {
     const name = relative(folder, path) || basename(path);
     try {
       const files = await filesIn(dirname(path));
-      const { positions, indices, ...extra } = parseMesh(new Uint8Array(await readFile(path)), { files });
+      const bytes = await decompressGltf(new Uint8Array(await readFile(path)), { files });
+      const { positions, indices, ...extra } = parseMesh(bytes, { files });
       const row = await deformed(library, library.Mesh.fromArrays(positions, indices, extra));
       process.stdout.write(
         line(

@@ -45,6 +45,9 @@ const STEP: f64 = 0.15;
 /// Largest number of times that the step of the handles is halved where the surface cannot follow, before they stop.
 const MOST_HALVINGS: u32 = 2;
 
+/// Largest distance of the middle of an edge from the given surface by rounding, as a share of the edge.
+const ON_SURFACE: f64 = 1e-5;
+
 /// Number of vertices added to the given surface after which no more edges are halved: needles take many.
 const MOST_ADDED: usize = 15_000;
 
@@ -459,8 +462,15 @@ fn with_column(rows: &[f32], count: usize, column: &[f32]) -> Vec<f32> {
 /// Returns the middle of an edge between two points of a surface, on the same component: others may touch it there.
 fn middle_of(ends: [BasePoint; 2], surface: &SurfaceWalker) -> BasePoint {
     let [p, q] = ends.map(|end| end.point);
-    let found = ends.map(|end| surface.walk(end.triangle, (p + q) * 0.5));
-    let found = if found[1].distance < found[0].distance { &found[1] } else { &found[0] };
+    let middle = (p + q) * 0.5;
+    let [one, other] = ends.map(|end| surface.walk(end.triangle, middle));
+    let mut found = if other.distance < one.distance { other } else { one };
+    // A walk may end elsewhere, at a point that is nearer than all around it.
+    if found.distance > ON_SURFACE * f64::from(p.distance(q))
+        && let Some(closest) = surface.closest(middle)
+    {
+        found = closest;
+    }
     BasePoint::at(surface, found.triangle, found.barycentric)
 }
 
@@ -495,4 +505,29 @@ fn halve_edges(
         now.distances.extend(mean);
     }
     now.mesh.vertex_count() - before
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Random;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// On some of these, the walk from a triangle to the middle of an edge ends elsewhere.
+    #[test]
+    fn edges_are_halved_on_the_surface() {
+        for seed in 0..20 {
+            let random = &mut Random::new(seed);
+            let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.7).unwrap().to_triangles();
+            mesh.positions.iter_mut().for_each(|p| *p *= 0.2 + 3.0 * random.unit() as f32);
+            mesh.normals = None;
+            let held = Held::new(&Band::of(mesh).unwrap(), &[], 0.1).unwrap();
+            let Placed { mesh, points, .. } = held.start();
+            assert!(mesh.vertex_count() > 1000, "seed {seed}");
+            let off = |v: VertexId| mesh.position(v).distance(points[v.index()].point);
+            let furthest = mesh.vertices().map(off).fold(0.0, f32::max);
+            assert!(furthest < 1e-4, "seed {seed}: {furthest}");
+        }
+    }
 }
