@@ -1,15 +1,8 @@
 // Decoders of compressed images: libraries of others, each imported when the first image that needs it is read.
 import { invalid } from '../check.js';
+import { type DecoderSource, installed, startedModule } from '../decoder-source.js';
 import { shortened } from '../short-text.js';
 import { badDicom, reasonOf } from './error.js';
-
-/** A decoder of images: a library of others. */
-export interface DecoderSource {
-  /** Imports the module of the library that is named in {@link Decoders}. */
-  load: () => Promise<unknown>;
-  /** Address of the library's `.wasm` file, if it has one; by default where the library looks for it. */
-  wasm?: string | URL;
-}
 
 /**
  * Decoders for compressed images. In Node, those that are installed are found; a page gives those that its images need,
@@ -47,7 +40,7 @@ interface Instance {
   delete(): void;
 }
 
-type Factory = (options: object) => Promise<Record<string, new () => Instance>>;
+type DecoderModule = Record<string, new () => Instance>;
 
 /** A compression, and the library that decodes it. */
 interface Codec {
@@ -109,7 +102,7 @@ export async function decoderOf(transferSyntax: string, decoders: Decoders): Pro
 /** Loaded decoders by what loads them, since an instance of a module takes longer than an image. */
 const instances = new Map<unknown, Promise<Decode>>();
 
-function loaded(codec: Codec, source: DecoderSource = installed(codec)): Promise<Decode> {
+function loaded(codec: Codec, source: DecoderSource = foundFor(codec)): Promise<Decode> {
   const key = source.load;
   const made = instances.get(key) ?? guarded(instantiated(codec, source), () => instances.delete(key));
   instances.set(key, made);
@@ -135,29 +128,16 @@ async function guarded(making: Promise<Decode>, forget: () => void): Promise<Dec
 /** Decoders that Node finds. */
 const found = new Map<Codec, DecoderSource>();
 
-function installed(codec: Codec): DecoderSource {
-  const { process } = globalThis as { process?: { versions?: { node?: string } } };
-  if (process?.versions?.node === undefined) throw new Error('it was not given');
-  const known = found.get(codec);
-  if (known) return known;
-  const { module } = codec;
-  // Bundlers leave an import by a variable alone.
-  const source = { load: () => import(/* webpackIgnore: true */ /* @vite-ignore */ module) };
+function foundFor(codec: Codec): DecoderSource {
+  const source = found.get(codec) ?? installed(codec.module);
   found.set(codec, source);
   return source;
 }
 
 async function instantiated({ kind }: Codec, { load, wasm }: DecoderSource): Promise<Decode> {
-  const module = (await load()) as { default?: unknown };
-  if (kind === undefined) return losslessJpeg(module);
-  const silent = () => {};
-  const options = { print: silent, printErr: silent, ...(wasm !== undefined && { locateFile: () => String(wasm) }) };
-  return decodeWith(kind, await factoryOf(module)(options));
-}
-
-/** A module of CommonJS, whose export some bundlers put into another `default`. */
-function factoryOf({ default: made }: { default?: unknown }): Factory {
-  return (typeof made === 'function' ? made : (Object(made) as { default: unknown }).default) as Factory;
+  const module = await load();
+  if (kind === undefined) return losslessJpeg(Object(module));
+  return decodeWith(kind, await startedModule<DecoderModule>(module, wasm));
 }
 
 /** The class of the decoder of lossless JPEG. */
@@ -176,7 +156,7 @@ function losslessJpeg(module: object): Decode {
   };
 }
 
-function decodeWith(kind: string, module: Record<string, new () => Instance>): Decode {
+function decodeWith(kind: string, module: DecoderModule): Decode {
   const Decoder = module[kind] as new () => Instance;
   return (bytes) => {
     const decoder = new Decoder();

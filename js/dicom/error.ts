@@ -1,4 +1,5 @@
 // Errors of DICOM files, and lists in messages.
+import { libraryReason } from '../decoder-source.js';
 import { VesicleError } from '../error.js';
 import { shortened } from '../short-text.js';
 
@@ -21,9 +22,8 @@ export function reasonOf(error: unknown): string {
   const { exception } = Object(error) as { exception?: unknown };
   if (exception !== undefined) return reasonOf(exception);
   if (error instanceof RangeError && /call stack/.test(error.message)) return 'sequences are nested too deeply';
-  const text = error instanceof Error ? error.message : String(error);
-  // Modules of C++ throw addresses.
-  if (/^\d+$/.test(text)) return 'the decoder failed';
   // Messages of dicom-parser begin with the name of the function.
-  return text.replace(/^dicomParser\.\w+: /, '').slice(0, 200);
+  return libraryReason(error)
+    .replace(/^dicomParser\.\w+: /, '')
+    .slice(0, 200);
 }

@@ -30,8 +30,9 @@ import { type Source, sourcesOf } from './source.js';
 import type { Frame, Skipped } from './types.js';
 import { type DicomProgress, type DicomReadOptions, type DicomVolume, ImageVolume } from './volume.js';
 
+export type { DecoderSource } from '../decoder-source.js';
 export type { InputFile, InputFiles } from '../input-file.js';
-export type { DecoderName, DecoderSource, Decoders } from './codecs.js';
+export type { DecoderName, Decoders } from './codecs.js';
 export type { Segment, Skipped } from './types.js';
 export { type DicomProgress, type DicomReadOptions, DicomVolume } from './volume.js';
 

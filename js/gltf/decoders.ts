@@ -1,6 +1,6 @@
 // Libraries that decode compressed meshes, each imported when the first document that needs it is read.
 import { invalid } from '../check.js';
-import type { DecoderSource } from '../dicom/codecs.js';
+import { type DecoderSource, installed } from '../decoder-source.js';
 import { reasonOf } from './error.js';
 
 /**
@@ -24,18 +24,10 @@ export async function started<T>(
   start: (module: unknown, wasm: DecoderSource['wasm']) => Promise<T>,
 ): Promise<T> {
   try {
-    const { load, wasm } = decoders[name] ?? installed(name);
+    const { load, wasm } = decoders[name] ?? installed(MODULES[name].module);
     return await start(await load(), wasm);
   } catch (error) {
     const what = `the meshes are compressed, and the decoder is not there (${reasonOf(error)})`;
     throw invalid(`decoders.${name}`, `${what}: install the package ${MODULES[name].package}, and in a page pass it`);
   }
-}
-
-function installed(name: keyof MeshDecoders): DecoderSource {
-  const { process } = globalThis as { process?: { versions?: { node?: string } } };
-  if (process?.versions?.node === undefined) throw new Error('it was not given');
-  const { module } = MODULES[name];
-  // Bundlers leave an import by a variable alone.
-  return { load: () => import(/* webpackIgnore: true */ /* @vite-ignore */ module) };
 }

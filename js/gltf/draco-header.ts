@@ -71,6 +71,7 @@ function facesOf(reader: Reader, version: number, isEdgebreaker: boolean): numbe
   const isLong = version < (isEdgebreaker ? 0x200 : 0x202);
   const count = () => (isLong ? reader.word() : reader.varint());
   if (!isEdgebreaker) return count();
+  // The way in which the traversal is coded.
   reader.skip(1);
   if (version < 0x202) count();
   count();
@@ -79,6 +80,7 @@ function facesOf(reader: Reader, version: number, isEdgebreaker: boolean): numbe
 
 function skipMetadata(reader: Reader, field: string, depth = 0): void {
   if (depth > DEEPEST) throw badGltf(field, 'the metadata of the Draco stream are nested too deeply');
+  // Entries: a name and a value. Then metadata within: a name, and the same again. Only their lengths matter here.
   for (let left = reader.varint(); left > 0; left--) {
     reader.skip(reader.byte());
     reader.skip(reader.varint());

@@ -1,5 +1,5 @@
 // KHR_draco_mesh_compression: all vertices and triangles of a primitive are one stream.
-import type { DecoderSource } from '../dicom/codecs.js';
+import { type DecoderSource, startedModule } from '../decoder-source.js';
 import type { Budget } from './budget.js';
 import { checkDracoHeader } from './draco-header.js';
 import { badGltf, reasonOf } from './error.js';
@@ -40,13 +40,7 @@ export interface Draco {
 }
 
 /** Returns a new instance of an imported module: one that a damaged stream broke is used no more, and its memory is given back. */
-export async function dracoInstance(module: unknown, wasm: DecoderSource['wasm']): Promise<Draco> {
-  const { default: made } = module as { default: unknown };
-  // A module of CommonJS, whose export some bundlers put into another `default`.
-  const make = (typeof made === 'function' ? made : object(made).default) as (options: object) => Promise<Draco>;
-  const silent = () => {};
-  return make({ print: silent, printErr: silent, ...(wasm !== undefined && { locateFile: () => String(wasm) }) });
-}
+export const dracoInstance = (module: unknown, wasm: DecoderSource['wasm']) => startedModule<Draco>(module, wasm);
 
 /** Type of numbers in the library, and their bytes, by the component type of an accessor. */
 const COMPONENTS = new Map([

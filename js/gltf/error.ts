@@ -1,4 +1,5 @@
 // Errors of compressed glTF documents.
+import { libraryReason } from '../decoder-source.js';
 import { VesicleError } from '../error.js';
 import { shortened } from '../short-text.js';
 
@@ -7,14 +8,12 @@ export function badGltf(field: string, problem: string): VesicleError {
   return new VesicleError('bad-file', `glTF: ${shortened(field)}: ${shortened(problem)}`);
 }
 
-/** Returns the `too-large` error for data that would need so many bytes. */
+/** Returns the `too-large` error for data that would decode to that number of bytes. */
 export function tooLarge(field: string, bytes: number): VesicleError {
   return new VesicleError('too-large', `glTF: ${shortened(field)}: needs ${bytes} bytes, far more than its file`);
 }
 
 /** Returns what an error of another library says. */
 export function reasonOf(error: unknown): string {
-  const text = error instanceof Error ? error.message : String(error);
-  // Modules of C++ throw addresses.
-  return /^\d+$/.test(text) ? 'the decoder failed' : text.slice(0, 150);
+  return libraryReason(error).slice(0, 150);
 }

@@ -6,7 +6,7 @@
  */
 import { checkProperties, typedArray } from '../check.js';
 import type { NamedFile } from '../data.js';
-import type { DecoderSource } from '../dicom/codecs.js';
+import type { DecoderSource } from '../decoder-source.js';
 import { VesicleError } from '../error.js';
 import { checkedNamedFiles } from '../input-file.js';
 import { budgetOf } from './budget.js';

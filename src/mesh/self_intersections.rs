@@ -41,7 +41,7 @@ pub fn count_self_intersections(mesh: &TriangleMesh) -> usize {
 }
 
 /// Returns which parts of a mesh intersect each other, or themselves: pairs of the numbers in `part_of`, which has that of
-/// each triangle, the lower one first. `None` where so many triangles lie on each other that time would be quadratic.
+/// each triangle, the lower one first. `None` if too many triangles overlap to test all pairs.
 pub(crate) fn intersecting_parts(mesh: &TriangleMesh, part_of: &[u32]) -> Option<BTreeSet<[u32; 2]>> {
     let most = MOST_TESTED[0].max(MOST_TESTED[1].saturating_mul(mesh.triangles.len()));
     let (mut pairs, mut tested) = (BTreeSet::new(), 0);

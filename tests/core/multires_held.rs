@@ -50,12 +50,21 @@ fn others() -> Vec<TriangleMesh> {
 }
 
 fn begun(detail: TriangleMesh) -> MultiresolutionModel {
+    begun_with(detail, &[])
+}
+
+fn begun_with(detail: TriangleMesh, start: &[ControlEllipsoid]) -> MultiresolutionModel {
     MultiresolutionModel::new(MultiresOptions {
         detail: Some(detail),
+        ellipsoids: start.to_vec(),
         support: Support::Surface,
         ..MultiresOptions::default()
     })
     .unwrap()
+}
+
+fn codes(report: &StepReport) -> Vec<WarningCode> {
+    report.warnings.iter().map(|warning| warning.code).collect()
 }
 
 fn finish(model: &mut MultiresolutionModel) {
@@ -267,15 +276,8 @@ fn what_cannot_hold_itself_is_refused() {
 fn parts_that_intersect_as_given_go_on_to_with_a_warning() {
     let parts = [Vec3::ZERO, Vec3::X * 1.5, Vec3::X * 3.9].map(|centre| bumpy(centre, 0.3));
     let start = vec![ball(0.0, 0.0, 0.0, 0.6), ball(1.5, 0.0, 0.0, 0.6), ball(3.9, 0.0, 0.0, 0.6)];
-    let options = MultiresOptions {
-        detail: Some(shapes::joined(&parts)),
-        ellipsoids: start.clone(),
-        support: Support::Surface,
-        ..Default::default()
-    };
-    let mut model = MultiresolutionModel::new(options).unwrap();
+    let mut model = begun_with(shapes::joined(&parts), &start);
     let report = settle(&mut model);
-    let codes = |report: &StepReport| report.warnings.iter().map(|w| w.code).collect::<Vec<_>>();
     assert_eq!(codes(&report), [WarningCode::SelfIntersecting]);
     // The second through the first: they may.
     let mut moved = start.clone();
@@ -303,17 +305,10 @@ fn parts_that_touch_as_given_can_be_parted() {
     let parts =
         [shapes::cuboid(Vec3::splat(2.0)), moved(shapes::cuboid(Vec3::new(2.0, 1.0, 1.0)), Vec3::X * 2.0)];
     let start = vec![ball(0.0, 0.0, 0.0, 0.8), ball(2.0, 0.0, 0.0, 0.4)];
-    let options = MultiresOptions {
-        detail: Some(shapes::joined(&parts)),
-        ellipsoids: start.clone(),
-        support: Support::Surface,
-        ..Default::default()
-    };
-    let mut model = MultiresolutionModel::new(options).unwrap();
+    let mut model = begun_with(shapes::joined(&parts), &start);
     let mut moved = start.clone();
     moved[0].center[0] = -0.4;
     model.set_ellipsoids(&moved).unwrap();
-    let codes = |report: &StepReport| report.warnings.iter().map(|w| w.code).collect::<Vec<_>>();
     assert_eq!(codes(&settle(&mut model)), [WarningCode::SelfIntersecting]);
     assert!((model.ellipsoids()[0].center[0] + 0.4).abs() < 1e-9);
     back_to(&mut model, &start);

@@ -7,7 +7,7 @@
 use super::contour::ObjectIs;
 use super::schedule::Convergence;
 use super::start::contour_mesh;
-use super::{DeformableModel, DeformableParams, Domain, Keys, Motion, SpeedSummary, StartContext};
+use super::{DeformableModel, DeformableParams, Keys, Motion, SpeedSummary, StartContext};
 use crate::math::Vec3;
 use crate::mesh::VertexId;
 use crate::methods::MethodError;
@@ -68,7 +68,6 @@ impl DeformableModel {
         self.params = params;
         let level = self.pyramid.levels.len() - 1;
         let delta = self.pyramid.delta_at(self.finest_delta, level);
-        self.domain = Domain::new(self.pyramid.dims(), delta);
         let context = StartContext::of(&self.pyramid, &self.params, self.domain, delta, &self.to_world);
         let Some(mut mesh) = contour_mesh(&context)? else {
             self.prepare_level()?;
@@ -79,8 +78,7 @@ impl DeformableModel {
         mesh.advance_versions_past(&self.mesh);
         self.mesh = mesh;
         self.level = level;
-        let most = self.domain.most_vertices(self.pyramid.delta_at(self.finest_delta, 0));
-        self.resolver = Resolver::with_max_vertices(most);
+        self.resolver = Resolver::with_max_vertices(self.resolver.max_vertices());
         self.motion = Motion::default();
         self.convergence = Convergence::default();
         self.convergence.began = self.iteration;

@@ -34,7 +34,7 @@ impl BasePoint {
 
 /// Converts a closest point on the base to a [`BasePoint`], with its position computed by [`BasePoint::at`], so that it
 /// has the same bits after a saved run is restored.
-fn to_base_point(base: &SurfaceWalker, found: &SurfacePoint) -> BasePoint {
+pub(super) fn to_base_point(base: &SurfaceWalker, found: &SurfacePoint) -> BasePoint {
     BasePoint::at(base, found.triangle, found.barycentric)
 }
 

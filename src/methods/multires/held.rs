@@ -4,7 +4,7 @@
 //! is a graph. Each point keeps its place on the given surface (the map T), from which its position follows: what the
 //! handles do, they can undo.
 
-use super::correspondence::{BasePoint, Correspondence, UNSET};
+use super::correspondence::{BasePoint, Correspondence, UNSET, to_base_point};
 use super::crossings::Crossings;
 use super::detail::{Band, Detailed};
 use super::ellipsoid::Ellipsoid;
@@ -471,7 +471,7 @@ fn middle_of(ends: [BasePoint; 2], surface: &SurfaceWalker) -> BasePoint {
     {
         found = closest;
     }
-    BasePoint::at(surface, found.triangle, found.barycentric)
+    to_base_point(surface, &found)
 }
 
 /// Halves all edges that `is_long` once, longest first, by `split`, which may refuse; returns their number. New vertices are
