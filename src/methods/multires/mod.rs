@@ -12,7 +12,8 @@
 //!
 //! # Guarantees
 //! After every step the deformed base and the detailed surface are closed, oriented 2-manifolds without
-//! self-intersections. The same input gives the same bits, natively and in wasm.
+//! self-intersections, but for components of a surface that holds itself that intersect as given. The same input gives
+//! the same bits, natively and in wasm.
 //!
 //! # Limits
 //! Detail is a displacement along normals: where it is longer than the radius of curvature of the base, it is shortened

@@ -1,6 +1,7 @@
 //! Collision handling: keeps a mesh free of self-intersections by rejecting edits and shortening displacements.
 //!
-//! The previous state of the mesh has no self-intersections, so it can always be restored. Detection has three parts:
+//! The previous state of the mesh has no self-intersections but those [`tolerated`], so it can always be restored.
+//! Detection has three parts:
 //! - [`broad_phase`]: pairs of non-adjacent vertices whose triangles may intersect, from a grid that is updated with
 //!   the mesh ([`VertexGrid`]);
 //! - [`narrow_phase`]: conservative filters (`one_ring`, `clearance`), then exact predicates on pairs of triangles;
