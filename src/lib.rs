@@ -2,7 +2,8 @@
 //! to a volume.
 //!
 //! Modules form one-way layers, enforced by `tests/core/architecture.rs`: `math < mesh < {spatial, volume} < remesh <
-//! methods < bindings`; `io` uses only math, mesh and volume, `voxelise` also spatial. All may use `warning`.
+//! methods < bindings`; `io` uses only math, mesh and volume, `voxelise` also spatial. All may use `warning`, and
+//! `remesh` and `methods` `pauses`.
 //!
 //! The JavaScript bindings are a crate of their own, `src/bindings`, with a Cargo feature for each method, so that a
 //! WebAssembly module can have one of them.
@@ -11,6 +12,7 @@ pub mod io;
 pub mod math;
 pub mod mesh;
 pub mod methods;
+pub mod pauses;
 pub mod remesh;
 pub mod spatial;
 pub mod volume;

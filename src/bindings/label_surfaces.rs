@@ -18,8 +18,8 @@ use super::volume::RawVolume;
 use vesicle::math::DVec3;
 use vesicle::mesh::TriangleMesh;
 use vesicle::methods::label_surfaces::{LabelParams, LabelSurfaces};
-use vesicle::methods::slices::{advance, finished};
 use vesicle::methods::{LiveSurface, Method, MethodError, StepReport};
+use vesicle::pauses::{advance, finished};
 
 type Computation<T> = Pin<Box<dyn Future<Output = T>>>;
 type Stepped = (LabelSurfaces, Result<StepReport, MethodError>);

@@ -18,12 +18,12 @@ use super::volume::RawVolume;
 use vesicle::io::AnimationWriter;
 use vesicle::math::DVec3;
 use vesicle::mesh::TriangleMesh;
-use vesicle::methods::slices::{advance, finished};
 use vesicle::methods::tracking::{
     Bounds, Cavity, Component, FrameStatistics, Proposal, Query, SurfaceTracker, TrackingOptions,
     TrackingParams,
 };
 use vesicle::methods::{LiveSurface, Method, MethodError, StepReport};
+use vesicle::pauses::{advance, finished};
 
 type Computation<T> = Pin<Box<dyn Future<Output = T>>>;
 

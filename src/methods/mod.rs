@@ -9,7 +9,6 @@ mod method;
 pub mod multires;
 mod params;
 mod saved;
-pub mod slices;
 mod spec;
 mod step;
 pub mod tracking;

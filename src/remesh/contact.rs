@@ -4,6 +4,7 @@
 use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
+use crate::pauses::Pauses;
 
 /// Fractions of the edges around a joined vertex, measured from that vertex, at which the rim of the new tube lies;
 /// tried in turn until one causes no self-intersection. Below the first, the tube is so thin that it is cut again at
@@ -21,18 +22,20 @@ struct ContactPair {
 impl Resolver {
     /// Resolves the contacts of the vertices marked for a contact query, by flips and joins; returns whether the mesh
     /// was changed.
-    pub(super) fn join_contacts(
+    pub(super) async fn join_contacts(
         &mut self,
         mesh: &mut Mesh,
         sampling: Sampling,
         guide: &dyn TopologyGuide,
+        pauses: &Pauses,
     ) -> bool {
-        let contacts = self.find_contacts(mesh, sampling);
+        let contacts = self.find_contacts(mesh, sampling, pauses).await;
         let mut changed = false;
         // Contacts next to a new tube stay pending until its edges are within bounds: joined at once, neighbouring
         // pairs of two facing sheets would create a handle each.
         let mut busy = vec![false; mesh.slots()];
         for ContactPair { square, u, v } in contacts {
+            pauses.after(1).await;
             if !free(mesh, &busy, u) || !free(mesh, &busy, v) || mesh.ring(u).contains(v) {
                 self.touch_live(mesh, u);
                 continue;
@@ -58,7 +61,7 @@ impl Resolver {
 
     /// Returns the pairs of vertices in contact, nearest first, of which at least one is marked for the contact query,
     /// and clears these marks.
-    fn find_contacts(&mut self, mesh: &Mesh, sampling: Sampling) -> Vec<ContactPair> {
+    async fn find_contacts(&mut self, mesh: &Mesh, sampling: Sampling, pauses: &Pauses) -> Vec<ContactPair> {
         let mut dirty = self.take_dirty();
         dirty.retain(|&v| mesh.is_live(v));
         let mut contacts = Vec::new();
@@ -69,6 +72,7 @@ impl Resolver {
         let mut is_dirty = vec![false; mesh.slots()];
         dirty.iter().for_each(|v| is_dirty[v.index()] = true);
         for &u in &dirty {
+            pauses.after(1).await;
             self.embedding.for_each_contact(mesh, u, sampling.contact(), |v, square| {
                 let contact = sampling.between(mesh, u, v).contact();
                 if square >= contact * contact {

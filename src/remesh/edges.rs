@@ -5,6 +5,7 @@ use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::Vec3;
 use crate::math::order::sort_by_rank;
 use crate::mesh::{EditError, Mesh, OppositeVertices, VertexId};
+use crate::pauses::Pauses;
 
 /// The longest edge that a collapse may produce, as a factor of the upper bound of edges, unless the edge was as long
 /// before. While all edges are within bounds, none exceeds 1.4; in a surface much finer than δ and too crowded for
@@ -19,9 +20,16 @@ const MAX_EDITS: u8 = 40;
 impl Resolver {
     /// Brings the lengths of edges around queued vertices within bounds where possible, until the queue is empty or the
     /// work limit of the resolver's call is reached.
-    pub(super) fn restore_edges(&mut self, mesh: &mut Mesh, sampling: Sampling, guide: &dyn TopologyGuide) {
+    pub(super) async fn restore_edges(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        guide: &dyn TopologyGuide,
+        pauses: &Pauses,
+    ) {
         while self.embedding.effort() < self.max_effort {
             let Some(u) = self.pop() else { return };
+            pauses.after(1).await;
             if mesh.is_live(u) && self.may_edit(u) {
                 self.restore_vertex(mesh, sampling, guide, u);
             }

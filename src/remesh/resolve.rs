@@ -4,6 +4,7 @@ use super::small_components::SmallComponents;
 use super::{Changes, Embedding, Sampling};
 use crate::math::{Bounds, DAffine3, Vec3};
 use crate::mesh::{EditError, Mesh, MeshError, Patch, VertexId};
+use crate::pauses::{Pauses, finished};
 use crate::spatial::CellSet;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -206,6 +207,18 @@ impl Resolver {
         active: &[VertexId],
         guide: &dyn TopologyGuide,
     ) -> Changes {
+        finished(self.resolve_in_slices(mesh, sampling, active, guide, &Pauses::default()))
+    }
+
+    /// Does what [`Self::resolve_guided`] does, and pauses meanwhile. The mesh is valid in each pause.
+    pub async fn resolve_in_slices(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        active: &[VertexId],
+        guide: &dyn TopologyGuide,
+        pauses: &Pauses,
+    ) -> Changes {
         self.embedding.sync_with_edge(mesh, sampling.longest());
         self.changes = Changes::default();
         self.overflowed = false;
@@ -220,11 +233,11 @@ impl Resolver {
             self.touch(v);
         }
         for _ in 0..PASSES {
-            self.restore_edges(mesh, sampling, guide);
+            self.restore_edges(mesh, sampling, guide, pauses).await;
             // While edges are out of bounds, nearly all pairs of vertices are in contact, and joins add more.
             if self.has_pending_edges()
                 || self.contact_policy == ContactPolicy::Leave
-                || !self.join_contacts(mesh, sampling, guide)
+                || !self.join_contacts(mesh, sampling, guide, pauses).await
             {
                 break;
             }

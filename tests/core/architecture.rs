@@ -7,16 +7,17 @@ use std::path::{Path, PathBuf};
 
 /// The modules that each module may use besides itself. `lib.rs` documents the same order. The bindings are a crate of
 /// their own, which no module can use.
-const ALLOWED: [(&str, &[&str]); 9] = [
+const ALLOWED: [(&str, &[&str]); 10] = [
     ("warning", &[]),
+    ("pauses", &[]),
     ("math", &[]),
     ("mesh", &["math"]),
     ("spatial", &["math", "mesh"]),
     ("volume", &["math", "mesh", "warning"]),
     ("io", &["math", "mesh", "volume", "warning"]),
     ("voxelise", &["math", "mesh", "spatial", "volume"]),
-    ("remesh", &["math", "mesh", "spatial", "volume"]),
-    ("methods", &["math", "mesh", "spatial", "volume", "remesh", "warning"]),
+    ("remesh", &["math", "mesh", "pauses", "spatial", "volume"]),
+    ("methods", &["math", "mesh", "pauses", "spatial", "volume", "remesh", "warning"]),
 ];
 
 /// Returns the names that follow `prefix` anywhere in the code: `crate::a::b` and `crate::{a::b, c}` give a; a and c.

@@ -5,10 +5,10 @@ use std::f64::consts::{PI, TAU};
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::{count_self_intersections, measure};
 use vesicle::methods::MethodError;
-use vesicle::methods::slices::{advance, finished};
 use vesicle::methods::tracking::{
     Bounds, Cavity, Component, Proposal, Query, SurfaceTracker, TrackingOptions, TrackingParams,
 };
+use vesicle::pauses::{advance, finished};
 use vesicle::volume::{Enrichment, Volume, VolumeInit, Voxels};
 use vesicle::warning::{Place, WarningCode};
 #[cfg(target_arch = "wasm32")]

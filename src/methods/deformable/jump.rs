@@ -11,6 +11,7 @@ use super::{DeformableModel, DeformableParams, Keys, Motion, SpeedSummary, Start
 use crate::math::Vec3;
 use crate::mesh::VertexId;
 use crate::methods::MethodError;
+use crate::pauses::{Pauses, finished};
 use crate::remesh::{Changes, Resolver};
 use crate::volume::CellCache;
 
@@ -82,9 +83,10 @@ impl DeformableModel {
         self.motion = Motion::default();
         self.convergence = Convergence::default();
         self.convergence.began = self.iteration;
+        self.began = self.iteration;
         self.speed = SpeedSummary::default();
         self.refreshed = Changes::default();
-        self.begin_on(true)?;
+        finished(self.begin_on(true, &Pauses::default()))?;
         self.components = self.mesh.component_count() as u32;
         Ok(())
     }

@@ -86,6 +86,7 @@ use super::method::method;
 use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId, grid_origin};
+use crate::pauses::{Pauses, finished};
 use crate::remesh::{Changes, Resolver, Sampling};
 use crate::volume::Volume;
 use domain::Domain;
@@ -242,6 +243,8 @@ pub struct DeformableModel {
     resolver: Resolver,
     motion: Motion,
     iteration: u32,
+    /// The number of iterations before the run began on its contour again, for another iso value.
+    began: u32,
     convergence: Convergence,
     speed: SpeedSummary,
     components: u32,
@@ -279,11 +282,22 @@ impl DeformableModel {
     /// start mesh that is not closed or intersects itself; [`MethodError::TooManyVertices`]; [`MethodError::Volume`] if
     /// there is no such frame or memory does not suffice.
     pub fn new(volume: &Volume, options: DeformableOptions) -> Result<Self, MethodError> {
+        finished(Self::begin(volume, options)?)
+    }
+
+    /// Begins to create a model as [`Self::new`] does, in [slices](crate::pauses); the volume is not needed any more.
+    ///
+    /// # Errors
+    /// As [`Self::new`], now or at the end.
+    pub fn begin(
+        volume: &Volume,
+        options: DeformableOptions,
+    ) -> Result<impl Future<Output = Result<Self, MethodError>> + use<>, MethodError> {
         let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
         params.validate()?;
         let pyramid = Pyramid::new(volume, options.frame, options.levels, &params)?;
         let origin = Origin { frame: options.frame, start: options.start, edge: options.edge, params };
-        Self::from_pyramid(pyramid, volume.affine(), origin)
+        Ok(Self::from_pyramid(pyramid, volume.affine(), origin))
     }
 
     /// Returns the largest [`DeformableOptions::levels`] for a volume: each level has at least two voxels along every
@@ -292,7 +306,8 @@ impl DeformableModel {
         image::max_levels(volume)
     }
 
-    fn from_pyramid(pyramid: Pyramid, affine: DAffine3, origin: Origin) -> Result<Self, MethodError> {
+    async fn from_pyramid(pyramid: Pyramid, affine: DAffine3, origin: Origin) -> Result<Self, MethodError> {
+        let pauses = Pauses::default();
         let Origin { frame, start, edge, params } = origin;
         let to_world = pyramid.to_world(&affine);
         let voxel = libm::cbrt(to_world.matrix3.determinant().abs());
@@ -308,7 +323,7 @@ impl DeformableModel {
             Some(mesh) => mesh,
             None => {
                 let guide = image_guide::guide(context.image, context.iso, &params);
-                start.make(&context, |value| pyramid.normalised(value), &*guide)?
+                start.make(&context, |value| pyramid.normalised(value), &*guide, &pauses).await?
             }
         };
         let keys = Keys::added_to(&mut mesh);
@@ -333,22 +348,23 @@ impl DeformableModel {
             follow: None,
             motion: Motion::default(),
             iteration: 0,
+            began: 0,
             convergence: Convergence::default(),
             speed: SpeedSummary::default(),
             components: 0,
             refreshed: Changes::default(),
             clock: || 0.0,
         };
-        model.begin_on(begins_on_contour)?;
+        model.begin_on(begins_on_contour, &pauses).await?;
         Ok(model)
     }
 
     /// Prepares a start mesh for the first iteration.
-    fn begin_on(&mut self, contour: bool) -> Result<(), MethodError> {
+    async fn begin_on(&mut self, contour: bool, pauses: &Pauses) -> Result<(), MethodError> {
         self.watch_output();
         self.prepare_level()?;
         if contour {
-            self.resolve_contour()?
+            self.resolve_contour(pauses).await?
         } else {
             self.reorder()
         }
@@ -370,11 +386,20 @@ impl DeformableModel {
     /// option `edge` is too long for the object. [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not
     /// suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
-        if self.pyramid.is_sparse() { self.step_if_loaded() } else { self.iterate(None) }
+        finished(self.step_in_slices())
+    }
+
+    /// Makes one iteration as [`Self::step`] does, in [slices](crate::pauses); on a sparse volume without a pause.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub async fn step_in_slices(&mut self) -> Result<StepReport, MethodError> {
+        if self.pyramid.is_sparse() { self.step_if_loaded() } else { self.iterate(None).await }
     }
 
     /// Makes one iteration; on a sparse volume `before` is completed, by which it can be undone.
-    fn iterate(&mut self, before: Option<&mut Before>) -> Result<StepReport, MethodError> {
+    async fn iterate(&mut self, before: Option<&mut Before>) -> Result<StepReport, MethodError> {
+        let pauses = &Pauses::default();
         let mut times = Times::default();
         let mut changes = std::mem::take(&mut self.refreshed);
         if !self.is_done() {
@@ -385,10 +410,10 @@ impl DeformableModel {
             }
             if self.params.topology == Topology::Adaptive {
                 let active = self.vertices_to_check();
-                changes += self.restore_bounds(&active, &mut times);
+                changes += self.restore_bounds(&active, &mut times, pauses).await;
             }
             self.iteration += 1;
-            changes += self.update_convergence(&mut times)?;
+            changes += self.update_convergence(&mut times, pauses).await?;
             self.count_components(changes);
             if let Some(most) = self.resolver.take_overflow() {
                 return Err(MethodError::TooManyVertices { most });
@@ -449,7 +474,7 @@ impl DeformableModel {
     /// if it has moved at all.
     fn vertices_to_check(&mut self) -> Vec<VertexId> {
         let limit = CHECK_TRAVEL * self.model_delta();
-        let turn = self.iteration as usize % CHECK_PERIOD;
+        let turn = (self.iteration - self.began) as usize % CHECK_PERIOD;
         let checked = self.mesh.vector(self.keys.checked_position);
         let travelled = |v: VertexId| checked[v.index()].distance_squared(self.mesh.position(v));
         let moving = self.motion.awake.moving.iter().copied();
@@ -463,14 +488,14 @@ impl DeformableModel {
 
     /// Restores edge bounds and resolves contacts around the vertices `active`, wakes the edited vertices and their
     /// neighbours, and renumbers the mesh if too few of its slots are live. Returns the numbers of edits.
-    fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times) -> Changes {
+    async fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times, pauses: &Pauses) -> Changes {
         let begin = (self.clock)();
         let sampling = self.sampling();
         let changes = {
             let image = &self.pyramid.levels[self.level];
             let guide =
                 image_guide::guide_within(image, self.level_iso, &self.params, self.followed_bounds());
-            self.resolver.resolve_guided(&mut self.mesh, sampling, active, &*guide)
+            self.resolver.resolve_in_slices(&mut self.mesh, sampling, active, &*guide, pauses).await
         };
         let since_edit = self.mesh.scalar_mut(self.keys.since_edit);
         self.resolver.edited().iter().for_each(|v| since_edit[v.index()] = 0.0);

@@ -12,6 +12,7 @@ use super::{DeformableModel, MEAN_EDGE, Topology};
 use crate::math::{Vec3, triangle};
 use crate::mesh::{DisjointSets, Mesh, TriangleMesh, VertexId};
 use crate::methods::{MethodError, StepReport, Times};
+use crate::pauses::{Pauses, finished};
 use crate::remesh::Changes;
 use crate::spatial::{CellSet, TriangleTree};
 use crate::volume::{Grid, Subdivided, marching_cubes, voxels_inside};
@@ -41,7 +42,7 @@ impl DeformableModel {
     pub fn seed(&mut self) -> Result<StepReport, MethodError> {
         self.check_is_whole()?;
         let mut times = Times::default();
-        let changes = self.seed_missing(&mut times)?;
+        let changes = finished(self.seed_missing(&mut times, &Pauses::default()))?;
         if changes.seeds > 0 {
             self.wake_all();
             self.count_components(changes);
@@ -51,7 +52,11 @@ impl DeformableModel {
 
     /// Adds closed contours of the matter and the cavities on this level that the mesh lacks, and restores edge bounds
     /// and contacts around them. Returns the numbers of edits, with that of the contours as `seeds`.
-    pub(super) fn seed_missing(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+    pub(super) async fn seed_missing(
+        &mut self,
+        times: &mut Times,
+        pauses: &Pauses,
+    ) -> Result<Changes, MethodError> {
         if self.params.iso_force == 0.0 || self.params.topology == Topology::Fixed {
             return Ok(Changes::default());
         }
@@ -69,7 +74,7 @@ impl DeformableModel {
             if self.convergence.sized {
                 self.set_sizes_of(&added);
             }
-            changes += self.restore_bounds(&added, times);
+            changes += self.restore_bounds(&added, times, pauses).await;
         }
         Ok(changes)
     }

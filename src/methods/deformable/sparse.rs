@@ -20,6 +20,7 @@ use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Connectivity, Mesh, ScalarKey, VertexId};
 use crate::methods::saved::Hash;
 use crate::methods::{MethodError, StepReport};
+use crate::pauses::finished;
 use crate::remesh::{Changes, Pending};
 use crate::volume::{BrickBox, BrickGrid, BrickId, CellCache, SparseVolume, merged};
 use fixedbitset::FixedBitSet;
@@ -181,7 +182,7 @@ impl DeformableModel {
         let affine = volume.levels()[options.finest].affine;
         let follow = follow(volume, &options, &pyramid.to_world(&affine))?;
         let origin = Origin { frame: 0, start: options.start, edge: options.edge, params };
-        let mut model = Self::from_pyramid(pyramid, affine, origin)?;
+        let mut model = finished(Self::from_pyramid(pyramid, affine, origin))?;
         model.follow = follow;
         Ok(model)
     }
@@ -197,7 +198,7 @@ impl DeformableModel {
     /// Makes one iteration if all bricks that it reads are loaded.
     pub(super) fn step_if_loaded(&mut self) -> Result<StepReport, MethodError> {
         let Some(SparseLevels { volume, finest, .. }) = self.pyramid.sparse.clone() else {
-            return self.iterate(None);
+            return finished(self.iterate(None));
         };
         // Locked all the time, so that other models of the volume wait.
         let mut bricks = volume.bricks();
@@ -222,7 +223,7 @@ impl DeformableModel {
             return Err(needs);
         }
         let (mut before, level) = (self.before(), self.level);
-        let result = self.iterate(Some(&mut before));
+        let result = finished(self.iterate(Some(&mut before)));
         let result = self.check_missed().and(result);
         if let Err(MethodError::NeedsData { .. }) = result {
             self.undo(before);

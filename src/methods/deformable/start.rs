@@ -8,6 +8,7 @@ use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, count_self_intersections};
 use crate::methods::MethodError;
 use crate::methods::caller_mesh::checked_mesh;
+use crate::pauses::Pauses;
 use crate::remesh::{Pending, Resolver, Sampling, TopologyGuide, Unguided};
 use crate::spatial::CellSet;
 use crate::volume::marching_cubes_of_slices;
@@ -137,20 +138,22 @@ impl Start {
     /// domain, spheres in contact, the caller's mesh empty or inside out, or the iso-surface is empty;
     /// [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] if the caller's mesh is open, not manifold or intersects
     /// itself, or the result does; [`MethodError::Volume`] if memory does not suffice.
-    pub(super) fn make(
+    pub(super) async fn make(
         &self,
-        context: &StartContext,
+        context: &StartContext<'_>,
         iso: impl Fn(f64) -> f32,
         guide: &dyn TopologyGuide,
+        pauses: &Pauses,
     ) -> Result<Mesh, MethodError> {
         let mut mesh = match self {
-            Self::Contour | Self::Enclosing => enclosing(context)?,
+            Self::Contour | Self::Enclosing => enclosing(context, pauses).await?,
             Self::Bubbles(n) => bubble_grid(context, *n)?,
             Self::Seeds { points, radius } => spheres_at(context, points, *radius)?,
             Self::MarchingCubes(value) => iso_surface(context, iso(*value))?,
             Self::Mesh(mesh) => caller_mesh(context, mesh)?,
         };
-        let mut resolver = resolve_all(&mut mesh, context.most_vertices(), context.sampling, guide)?;
+        let most = context.most_vertices();
+        let mut resolver = resolve_all(&mut mesh, most, context.sampling, guide, pauses).await?;
         if !resolver.is_embedded(&mesh) {
             return Err(MeshError::SelfIntersecting {
                 pairs: count_self_intersections(&mesh.to_triangles()),
@@ -171,13 +174,13 @@ impl DeformableModel {
     ///
     /// # Errors
     /// [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] if it intersects itself after all edits were tested.
-    pub(super) fn resolve_contour(&mut self) -> Result<(), MethodError> {
+    pub(super) async fn resolve_contour(&mut self, pauses: &Pauses) -> Result<(), MethodError> {
         let contour = self.mesh.clone();
         let mut tested = CellSet::new(TESTED_CELL * self.sampling().longest());
         let mut runs = 0;
         loop {
             self.resolver.set_tested_cells((runs < MAX_RUNS).then(|| tested.clone()));
-            let resolved = self.resolve_sized();
+            let resolved = self.resolve_sized(pauses).await;
             // Later calls have no contour to return to, so all their edits are tested, also after an error.
             self.resolver.set_tested_cells(None);
             resolved?;
@@ -201,49 +204,52 @@ impl DeformableModel {
         }
     }
 
-    fn resolve_sized(&mut self) -> Result<(), MethodError> {
+    async fn resolve_sized(&mut self, pauses: &Pauses) -> Result<(), MethodError> {
         let all: Vec<_> = self.mesh.vertices().collect();
         self.set_sizes_of_small_parts(&all);
-        self.resolve_everywhere()?;
+        self.resolve_everywhere(pauses).await?;
         // A contour of the finest level is close to the result. Other starts are sized once they have settled.
         if self.level == 0 && self.set_sizes() {
-            self.resolve_everywhere()?;
+            self.resolve_everywhere(pauses).await?;
         }
         self.reorder();
         Ok(())
     }
 
-    fn resolve_everywhere(&mut self) -> Result<(), MethodError> {
+    async fn resolve_everywhere(&mut self, pauses: &Pauses) -> Result<(), MethodError> {
         let sampling = self.sampling();
         let guide = image_guide::guide(&self.pyramid.levels[self.level], self.level_iso, &self.params);
-        resolve_with(&mut self.resolver, &mut self.mesh, sampling, &*guide)
+        resolve_with(&mut self.resolver, &mut self.mesh, sampling, &*guide, pauses).await
     }
 }
 
 /// Brings the edges of a mesh within bounds and resolves its contacts, with a new resolver, which is returned.
-fn resolve_all(
+async fn resolve_all(
     mesh: &mut Mesh,
     most_vertices: usize,
     sampling: Sampling,
     guide: &dyn TopologyGuide,
+    pauses: &Pauses,
 ) -> Result<Resolver, MethodError> {
     let mut resolver = Resolver::with_max_vertices(most_vertices);
-    resolve_with(&mut resolver, mesh, sampling, guide)?;
+    resolve_with(&mut resolver, mesh, sampling, guide, pauses).await?;
     Ok(resolver)
 }
 
-fn resolve_with(
+async fn resolve_with(
     resolver: &mut Resolver,
     mesh: &mut Mesh,
     sampling: Sampling,
     guide: &dyn TopologyGuide,
+    pauses: &Pauses,
 ) -> Result<(), MethodError> {
-    resolver.resolve_guided(mesh, sampling, &mesh.vertices().collect::<Vec<_>>(), guide);
+    let all: Vec<_> = mesh.vertices().collect();
+    resolver.resolve_in_slices(mesh, sampling, &all, guide, pauses).await;
     for _ in 0..MAX_CALLS {
         if !resolver.has_pending_edges() {
             break;
         }
-        resolver.resolve_guided(mesh, sampling, &[], guide);
+        resolver.resolve_in_slices(mesh, sampling, &[], guide, pauses).await;
     }
     if let Some(most) = resolver.take_overflow() {
         return Err(MethodError::TooManyVertices { most });
@@ -257,7 +263,7 @@ fn resolve_with(
 ///
 /// An icosahedron is refined, and after each refinement projected onto the box and its edges brought within bounds: a
 /// fine icosahedron squashed onto a flat box would have triangles that no edit can repair.
-fn enclosing(context: &StartContext) -> Result<Mesh, MethodError> {
+async fn enclosing(context: &StartContext<'_>, pauses: &Pauses) -> Result<Mesh, MethodError> {
     let delta = context.sampling.shortest();
     let most = context.most_vertices();
     if context.domain.enclosing_vertices(delta) > most {
@@ -279,7 +285,7 @@ fn enclosing(context: &StartContext) -> Result<Mesh, MethodError> {
         let slots: Vec<_> = mesh.vertices().collect();
         slots.into_iter().for_each(|v| mesh.set_position(v, onto_box(mesh.position(v))));
         if 3.0 * delta < axes.min_element() {
-            _ = resolve_all(&mut mesh, most, Sampling::new(delta), &Unguided)?;
+            _ = resolve_all(&mut mesh, most, Sampling::new(delta), &Unguided, pauses).await?;
         }
     }
     Ok(mesh)

@@ -10,7 +10,9 @@ use crate::methods::saved::{Hash, MAX_VALENCE, Magic, can_be_checked, decode, en
 use crate::remesh::{Changes, Pending, Resolver};
 use serde::{Deserialize, Serialize};
 
-const MAGIC: Magic = *b"VSCLDEF\x06";
+const MAGIC: Magic = *b"VSCLDEF\x07";
+/// The magic bytes of states of before, without the iteration in which the run began again.
+const MAGIC_BEFORE: Magic = *b"VSCLDEF\x06";
 /// The magic bytes of states of sparse volumes, which have one more field: whether the factor on the image force is still
 /// to be measured.
 const SPARSE_MAGIC: Magic = *b"VSCLDES\x01";
@@ -64,7 +66,7 @@ impl DeformableModel {
         if self.pyramid.is_sparse() {
             return encode(&SPARSE_MAGIC, &(self.needs_factor, state));
         }
-        encode(&MAGIC, &state)
+        encode(&MAGIC, &(self.began, state))
     }
 
     /// Restores a run from bytes made by [`Self::save`]; this model must have the same volume, frame and levels, and on a
@@ -75,11 +77,15 @@ impl DeformableModel {
     /// attractor in it is invalid, [`MethodError::Volume`] if the gradient image does not fit into memory; the model is
     /// unchanged then.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
-        let (needs_factor, state): (bool, State) = if self.pyramid.is_sparse() {
-            decode(&SPARSE_MAGIC, bytes)?
+        let (mut needs_factor, mut began) = (false, 0);
+        let state: State;
+        if self.pyramid.is_sparse() {
+            (needs_factor, state) = decode(&SPARSE_MAGIC, bytes)?;
+        } else if bytes.starts_with(&MAGIC_BEFORE) {
+            state = decode(&MAGIC_BEFORE, bytes)?;
         } else {
-            (false, decode(&MAGIC, bytes)?)
-        };
+            (began, state) = decode(&MAGIC, bytes)?;
+        }
         if state.fingerprint != self.fingerprint() {
             let problem =
                 "the state belongs to another volume, frame or number of levels, or to a version that did \
@@ -88,8 +94,13 @@ impl DeformableModel {
             return Err(MethodError::BadState { field: "volume", problem });
         }
         self.check_state(&state)?;
+        if began > state.iteration {
+            let problem = "the run began again after its last iteration".into();
+            return Err(MethodError::BadState { field: "iteration", problem });
+        }
         self.take_state(state)?;
         self.needs_factor = needs_factor;
+        self.began = began;
         Ok(())
     }
 

@@ -19,7 +19,7 @@ use crate::math::order::sort_distinct;
 use crate::math::predicates::collinear;
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::mesh::{Facet, facets_intersect};
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use smallvec::SmallVec;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};

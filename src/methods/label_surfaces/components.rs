@@ -7,7 +7,7 @@ use super::cells::{BLOCK_SIDE, Cell, CellBox, Cells};
 use super::cube_loops::{cube_loops, edges_across, face};
 use super::label_grid::BACKGROUND;
 use crate::mesh::DisjointSets;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 
 /// Work that a block counts as.
 const BLOCK_WORK: usize = 50;

@@ -3,7 +3,7 @@
 use super::cells::CellBox;
 use super::label_grid::BACKGROUND;
 use super::nets::{NetVertex, Nets};
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use std::collections::BTreeSet;
 
 /// The numbers of vertices and triangles of all surfaces together, or of a part of them.

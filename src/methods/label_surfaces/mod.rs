@@ -31,8 +31,8 @@ pub use params::LabelParams;
 use crate::math::{DAffine3, DVec3, box_corners};
 use crate::mesh::{TriangleMesh, grid_origin};
 use crate::methods::method::method;
-use crate::methods::slices::{Pauses, finished};
 use crate::methods::{LiveSurface, MethodError, Parameters, StepReport, Times};
+use crate::pauses::{Pauses, finished};
 use crate::remesh::Changes;
 use crate::volume::{Region, Volume, listed};
 use crate::warning::{Place, Warning, WarningCode};
@@ -125,7 +125,7 @@ impl LabelSurfaces {
         finished(Self::begin(volume, labels, params)?)
     }
 
-    /// Begins to create surfaces as [`Self::new`] does, in [slices](crate::methods::slices); the volume is not needed any
+    /// Begins to create surfaces as [`Self::new`] does, in [slices](crate::pauses); the volume is not needed any
     /// more then.
     ///
     /// # Errors
@@ -325,7 +325,7 @@ impl LabelSurfaces {
         finished(self.step_in_slices())
     }
 
-    /// Makes one step as [`Self::step`] does, in [slices](crate::methods::slices).
+    /// Makes one step as [`Self::step`] does, in [slices](crate::pauses).
     ///
     /// # Errors
     /// As [`Self::step`].

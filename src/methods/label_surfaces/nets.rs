@@ -16,7 +16,7 @@ use crate::math::order::sort_distinct;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::mesh::grid_origin;
 use crate::methods::MethodError;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use crate::volume::VolumeError;
 
 /// Largest number of cells through which surfaces pass; more take more than a gigabyte. Labels of noise have as many in 200³

@@ -6,8 +6,8 @@ use super::label_grid::LabelGrid;
 use super::{CellBox, LabelParams, LabelSurfaces};
 use crate::math::Vec3;
 use crate::methods::saved::{Hash, Magic, decode, encode};
-use crate::methods::slices::{Pauses, finished};
 use crate::methods::{MethodError, Parameters};
+use crate::pauses::{Pauses, finished};
 use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLLAB\x02";

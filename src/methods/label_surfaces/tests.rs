@@ -3,7 +3,7 @@ use super::*;
 use crate::core_tests::common::seeds;
 use crate::math::{DAffine3, DVec3, Random, Vec3};
 use crate::mesh::{measure, report};
-use crate::methods::slices::advance;
+use crate::pauses::advance;
 use crate::spatial::TriangleTree;
 use crate::volume::{VolumeInit, Voxels, voxels_inside};
 use crate::warning::Place;

@@ -10,7 +10,7 @@ use super::nets::{GAP, NetVertex, Nets};
 use super::zone::{NONE, Polygon, Zone, pair, step_to, within_reach};
 use crate::math::Vec3;
 use crate::math::order::sort_distinct;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The number of voxels per face below which a label is thin; a sheet of four voxels between others has two. Above, what

@@ -11,7 +11,7 @@ use super::nets::{Crossing, NetVertex, Nets};
 use crate::math::Vec3;
 use crate::math::order::sort_distinct;
 use crate::mesh::{Facet, facets_intersect};
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use std::collections::BTreeMap;
 use std::ops::Range;
 

@@ -7,7 +7,7 @@ use super::region::Region;
 use super::vote::{Face, Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
 use crate::math::order::sort_distinct;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 
 impl Region {
     fn is_inside(&self, at: [usize; 3]) -> bool {

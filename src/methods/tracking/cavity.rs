@@ -12,7 +12,7 @@ use super::presence::inside_voxels;
 use super::region::{MAX_LEVEL, Region};
 use super::vote::BoundaryVoting;
 use super::{Component, SurfaceTracker};
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use serde::{Deserialize, Serialize};
 
 /// Radius of the ball, as a share of the radius of the largest ball within the cavity in any frame: muscles up to twice as

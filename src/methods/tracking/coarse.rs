@@ -4,7 +4,7 @@ use super::lattice::Lattice;
 use super::region::{BINS, MAX_LEVEL, bin_of, intensity_quantiles, noise_of};
 use crate::math::DVec3;
 use crate::methods::MethodError;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use crate::volume::{Region, Volume};
 
 /// Largest number of voxels, of all frames together, that are visited: in some seconds. Of a larger sequence, every other

@@ -9,7 +9,7 @@ use super::vote::{Faces, X, Y, Z};
 use crate::math::{DAffine3, DVec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use crate::volume::{Grid, marching_cubes};
 
 /// Half-width of the band around the boundary points in which the distance from the planes fitted to them is used, as a

@@ -7,7 +7,7 @@ use super::region::Region;
 use super::vote::BoundaryVoting;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId, curvature, measure};
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
 use serde::{Deserialize, Serialize};
 

@@ -10,7 +10,7 @@
 use super::region::Region;
 use super::vote::{Faces, X, Y, Z};
 use crate::math::ConjugateGradients;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 
 /// Number of voxels that count as one unit of work between pauses, in an iteration of the conjugate gradients.
 const VOXELS_PER_UNIT: usize = 64;
@@ -210,7 +210,7 @@ mod tests {
     use super::super::working_space::WorkingSpace;
     use super::*;
     use crate::math::{DAffine3, DVec3, Random};
-    use crate::methods::slices::finished;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 

@@ -1,6 +1,6 @@
 //! Voxel masks of a box of voxels: distances from them, and their connected parts.
 
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 
 /// The number of voxels that count as one unit of work between pauses.
 const VOXELS_PER_UNIT: usize = 256;
@@ -236,7 +236,7 @@ impl Line {
 mod tests {
     use super::*;
     use crate::math::Random;
-    use crate::methods::slices::finished;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 

@@ -43,10 +43,11 @@ pub use frame_tracker::FrameStatistics;
 pub use params::TrackingParams;
 
 use super::method::method;
-use super::slices::{Pauses, finished};
+
 use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, measure};
+use crate::pauses::{Pauses, finished};
 use crate::remesh::Changes;
 use crate::spatial::surface_distance;
 use crate::volume::Volume;

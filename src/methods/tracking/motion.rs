@@ -5,7 +5,7 @@ use super::organ::depths;
 use super::propose::{BLUR, two_kinds};
 use super::region::MAX_LEVEL;
 use crate::methods::MethodError;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 
 /// Smallest variation with time, as a share of the range of intensities and in standard deviations of the noise, that
 /// shows motion.

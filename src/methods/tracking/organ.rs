@@ -5,7 +5,7 @@
 //! connected to that within its radius.
 
 use super::lattice::Lattice;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 
 /// Radius of the ball that an object is cut at necks by, as a share of the radius of the largest ball around its middle.
 /// With a larger one, ends that taper are cut off; with a smaller one, wide necks are no longer cut.

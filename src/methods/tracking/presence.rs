@@ -18,7 +18,7 @@ use super::{FrameStatistics, SurfaceTracker};
 use crate::math::DAffine3;
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use crate::remesh::Changes;
 use crate::volume::voxels_inside;
 use fixedbitset::FixedBitSet;

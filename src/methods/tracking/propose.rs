@@ -12,7 +12,7 @@ use super::region::{MAX_LEVEL, voxels_around};
 use super::{Proposal, Query, SurfaceTracker};
 use crate::math::DVec3;
 use crate::methods::MethodError;
-use crate::methods::slices::{Pauses, finished};
+use crate::pauses::{Pauses, finished};
 use crate::volume::Volume;
 
 /// Radius of the first ball around a point, in units of the shortest side of a voxel, and the ratio of each to the next.

@@ -8,7 +8,7 @@ use crate::math::{Vec3, triangle};
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
 use crate::methods::caller_mesh::checked_mesh;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use crate::remesh::{EdgeBounds, remesh};
 
 /// Target edge length of the mesh extracted from the first frame, in units of the shortest side of a voxel.

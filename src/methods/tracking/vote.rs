@@ -2,7 +2,7 @@
 //! by intensity, and votes for the faces between voxels of different clusters.
 
 use super::region::Region;
-use crate::methods::slices::Pauses;
+use crate::pauses::Pauses;
 use serde::{Deserialize, Serialize};
 use wide::u8x16;
 
@@ -469,7 +469,7 @@ mod tests {
     use super::super::working_space::WorkingSpace;
     use super::*;
     use crate::math::{DAffine3, DVec3, Random};
-    use crate::methods::slices::finished;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
