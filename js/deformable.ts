@@ -18,15 +18,17 @@ import { frameOf } from './mesh-file.js';
 import { Handle } from './runtime.js';
 import { type SparseBox, type SparseSource, sparseSource, supply } from './sparse.js';
 import {
+  checkedSlices,
   checkListener,
   checkSignal,
   Runner,
   type RunOptions,
   runInSlices,
+  type SliceOptions,
   type Stepper,
   type StepReport,
 } from './stepper.js';
-import { RawDeformable, RawStart, type RawVolume } from './vesicle.js';
+import { RawDeformable, RawDeformableCreation, RawStart, type RawVolume } from './vesicle.js';
 import { checkedRegion, type Volume, volumeHandle } from './volume.js';
 import { ModelWarnings } from './warnings.js';
 
@@ -217,21 +219,50 @@ export class DeformableModel implements Stepper {
    *   for a start mesh that is; `too-large`.
    */
   constructor(given: DeformableOptions) {
-    const options = checked(given);
-    const params = shallowCopy('params', options.params ?? {});
+    const created = given instanceof Created ? given : undefined;
+    const options = created ? created.options : checked(given);
     const source = sparseSource(options.volume);
-    if (source) {
+    if (created) {
+      this.#volume = created.volume;
+      this.#handle = created.handle;
+    } else if (source) {
       this.#sparse = { source, volume: source.create() };
-      this.#handle = onSparse(this.#sparse, options, params);
+      this.#handle = onSparse(this.#sparse, options);
     } else {
       this.#volume = volumeHandle('volume', options.volume as Volume);
-      this.#handle = onDense(this.#volume, options, params);
+      const make = dense(this.#volume, options, (...of) => new RawDeformable(...of));
+      this.#handle = new Handle('DeformableModel', make);
     }
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     const start = options.start instanceof Mesh ? options.start.warnings : [];
     this.#warnings = new ModelWarnings((source ?? (options.volume as Volume)).warnings, start);
     const frame = frameOf(source ? { space: undefined, unit: source.unit } : (options.volume as Volume));
     this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of(), frame);
+  }
+
+  /**
+   * Creates a model as the constructor does, bit for bit, yielding to the event loop between slices of work: the initial
+   * surface of a large or noisy volume takes seconds. That of a {@link LargeVolume} is created at once. The volume must not
+   * be freed before.
+   *
+   * @param options - `signal`: aborts the creation; `budgetMs`: duration of a slice, milliseconds, default 12.
+   * @throws As the constructor; `signal.reason` when aborted.
+   */
+  static async create(given: DeformableOptions, options?: SliceOptions): Promise<DeformableModel> {
+    const { signal, budgetMs } = checkedSlices(options);
+    signal?.throwIfAborted();
+    const checkedOptions = checked(given);
+    if (sparseSource(checkedOptions.volume)) return new DeformableModel(given);
+    const volume = volumeHandle('volume', checkedOptions.volume as Volume);
+    const begin = dense(volume, checkedOptions, (...of) => new RawDeformableCreation(...of));
+    const creation = new Handle('DeformableModel', begin);
+    try {
+      const raw = await runInSlices(() => creation.use((one) => one.advance()), signal, budgetMs);
+      const handle = new Handle('DeformableModel', () => raw);
+      return new DeformableModel(new Created(checkedOptions, volume, handle) as unknown as DeformableOptions);
+    } finally {
+      creation.free();
+    }
   }
 
   /**
@@ -295,8 +326,8 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * Runs to the end, yielding to the event loop between slices of work. Parameters and attractors may be changed
-   * meanwhile.
+   * Runs to the end, yielding to the event loop between slices of work, also within a step. Parameters and attractors may
+   * be changed meanwhile; like all that looks at the model, that ends a step that is under way first.
    *
    * @returns The last report.
    * @throws `signal.reason` when aborted, and the model stays usable; any error thrown by `onStep` or `onData`;
@@ -307,13 +338,22 @@ export class DeformableModel implements Stepper {
   async run(given?: DeformableRunOptions): Promise<StepReport> {
     const { onData, ...run } = checkProperties<DeformableRunOptions>('options', given, RUN_OPTIONS);
     checkListener('onData', onData);
-    return this.#runner.run(() => this.#step(1), run, onData);
+    return this.#runner.run(() => this.#advance(), run, onData);
+  }
+
+  /** Does a slice of a step; returns its report at its end. */
+  #advance(): StepReport | undefined {
+    const outcome = this.#handle.use((raw) => raw.advance() as StepOutcome | undefined);
+    return outcome && this.#taken(outcome);
   }
 
   #step(iterations: number): StepReport {
-    const report = this.#handle.use((raw) => raw.step(iterations) as StepReport | { needs: SparseBox[] });
-    if (!('needs' in report)) return this.#warnings.take(report);
-    throw new NeedsDataError((options) => this.#load(report.needs, options));
+    return this.#taken(this.#handle.use((raw) => raw.step(iterations) as StepOutcome));
+  }
+
+  #taken(outcome: StepOutcome): StepReport {
+    if (!('needs' in outcome)) return this.#warnings.take(outcome);
+    throw new NeedsDataError((options) => this.#load(outcome.needs, options));
   }
 
   async #load(needs: SparseBox[], options: DataOptions | undefined): Promise<void> {
@@ -449,17 +489,34 @@ interface SparseParts {
 
 type Options = Partial<DeformableOptions>;
 
-function onDense(volume: Handle<RawVolume>, options: Options, params: DeformableParams): Handle<RawDeformable> {
+/** The report of a step, or the data that it needs. */
+type StepOutcome = StepReport | { needs: SparseBox[] };
+
+/** Arguments that {@link DeformableModel.create} passes to the constructor. */
+class Created {
+  constructor(
+    readonly options: Options,
+    readonly volume: Handle<RawVolume>,
+    readonly handle: Handle<RawDeformable>,
+  ) {}
+}
+
+/** Returns a function that makes what needs the arguments of a model of a volume in memory. */
+function dense<T>(
+  volume: Handle<RawVolume>,
+  options: Options,
+  make: (...of: ConstructorParameters<typeof RawDeformable>) => T,
+): () => T {
+  const params = shallowCopy('params', options.params ?? {});
   const { frame = 0, start = 'contour', levels = 0, edge } = options;
   for (const name of ['finest', 'box'] as const) {
     if (options[name] !== undefined) throw invalid(name, 'only for volumes larger than memory');
   }
-  return new Handle('DeformableModel', () =>
-    volume.use((raw) => new RawDeformable(raw, frame, rawStart(start), levels, edge, params)),
-  );
+  return () => volume.use((raw) => make(raw, frame, rawStart(start), levels, edge, params));
 }
 
-function onSparse({ volume }: SparseParts, options: Options, params: DeformableParams): Handle<RawDeformable> {
+function onSparse({ volume }: SparseParts, options: Options): Handle<RawDeformable> {
+  const params = shallowCopy('params', options.params ?? {});
   const { start = 'contour', finest = 0, edge, box } = options;
   try {
     for (const name of ['frame', 'levels'] as const) {

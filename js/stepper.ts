@@ -57,8 +57,8 @@ export interface RunOptions {
    */
   maxIterations?: number;
   /**
-   * Duration of a slice of work before yielding to the event loop, milliseconds; default 12. A step is never
-   * interrupted.
+   * Duration of a slice of work before yielding to the event loop, milliseconds; default 12. Steps of `ImplicitSurface`
+   * and `MultiresolutionModel` are never interrupted, and of models of a volume larger than memory.
    */
   budgetMs?: number;
   /** Called with the report of every iteration. If it throws, the run ends and rejects with that error. */

@@ -205,7 +205,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
 export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N], 'prototype'>> } = {
   Volume: { parse: 'method', fromFrames: 'method' },
   Mesh: { icosphere: 'method', fromArrays: 'method', parse: 'method', marchingCubes: 'method' },
-  DeformableModel: { maxLevels: 'method' },
+  DeformableModel: { maxLevels: 'method', create: 'method' },
   ImplicitSurface: {},
   SurfaceTracker: { propose: 'method' },
   MultiresolutionModel: {},

@@ -572,3 +572,47 @@ test('refresh needs the volume', () => {
   gone.free();
   expect(failure(() => fitted.refresh({ min: [0, 0, 0], dims: [1, 1, 1] })).code).toBe('freed');
 });
+
+/** A volume of noise, of which a model is much work. */
+function noise(size: number): Volume {
+  let state = 7;
+  const data = Uint8Array.from({ length: size ** 3 }, () => {
+    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+    return state >>> 24;
+  });
+  return new Volume({ data, dims: [size, size, size] });
+}
+
+test('a model can be created in slices, with the same bits, and not if that is aborted', async () => {
+  const volume = noise(24);
+  const whole = new DeformableModel({ volume, levels: 1 });
+  const sliced = await DeformableModel.create({ volume, levels: 1 }, { budgetMs: 0.1 });
+  expect(sliced).toBeInstanceOf(DeformableModel);
+  expect(sliced.save()).toEqual(whole.save());
+  const stop = new AbortController();
+  // Runs only if the creation lets it.
+  setTimeout(() => stop.abort(new Error('enough')));
+  const options = { signal: stop.signal, budgetMs: 0.1 };
+  await expect(DeformableModel.create({ volume }, options)).rejects.toThrow('enough');
+  await expect(DeformableModel.create({ volume }, options)).rejects.toThrow('enough');
+  const error = await rejection(DeformableModel.create({ volume, edge: -1 }));
+  expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining('edge')]);
+});
+
+test('a run that is aborted within a step leaves a model in which nothing is half done', async () => {
+  const volume = noise(24);
+  const [whole, sliced] = [new DeformableModel({ volume }), new DeformableModel({ volume })];
+  const stop = new AbortController();
+  setTimeout(() => stop.abort(new Error('enough')));
+  let steps = 0;
+  const onStep = () => {
+    steps++;
+  };
+  await expect(sliced.run({ signal: stop.signal, budgetMs: 0.1, onStep })).rejects.toThrow('enough');
+  // A step that was under way ends when someone looks.
+  expect(sliced.mesh.check()).toMatchObject({ closed: true, oriented: true, selfIntersections: 0 });
+  const at = (await sliced.run({ maxIterations: 1 })).iteration;
+  expect(at).toBeGreaterThan(steps);
+  expect(whole.step(at).iteration).toBe(at);
+  expect(sliced.save()).toEqual(whole.save());
+});
