@@ -112,7 +112,8 @@ const RIGHT: Case[] = [
   ['0.5 cm', HEIGHT, 'lessons.rightAs'],
   ['81 handles', { value: 81 }, 'lessons.right'],
   ['two (one for the first)', { value: 2 }, 'lessons.right'],
-  ['15,540', { value: 15540 }, 'lessons.rightAs'],
+  ['15,540', { value: 15540 }, 'lessons.right'],
+  ['15.540', { value: 15540 }, 'lessons.rightAs'],
   ['0 %', { value: 0 }, 'lessons.rightAs'],
   ...(['0', 'zero', 'null', 'none', '-0', '0 N', '0 mm', '0/5'] as const).map(
     (typed): Case => [typed, { value: 0 }, 'lessons.right'],

@@ -41,7 +41,9 @@ export function judge(typed: string, expected: Expected): Verdict {
   // Nothing is nothing in any unit.
   const isNothing = value === 0 && values.includes(0);
   if (!fits && !isNothing) return unit ? wrong('lessons.unitWrong', { unit }) : wrong('lessons.noUnit');
-  return compared(values, fits && given ? given.factor / asked.factor : 1, { ...expected, value });
+  const verdict = compared(values, fits && given ? given.factor / asked.factor : 1, { ...expected, value });
+  // What is typed as it is shown here needs no note.
+  return verdict.says === rightAs(typed.trim()) ? { isRight: true, says: text('lessons.right') } : verdict;
 }
 
 /** Compares numbers, times the factor of a conversion of units, with what is expected. */
