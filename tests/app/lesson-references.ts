@@ -1,8 +1,8 @@
-/** What a student reads off the labs in the lessons, the answers that follow from it, and the figures that texts state. */
+/** Answers to the lessons' questions as they follow from what the labs show, and figures of runs that texts state. */
 
 /** A measure as the lab shows it, rounded, by its name. */
 export type Shown = (measure: string) => number;
-/** What was shown when each step was ticked, by the id of the step. */
+/** Returns the measures as they were shown when a step was ticked, by the id of the step. */
 export type ShownIn = (step: string) => Shown;
 
 export interface Reference {
@@ -17,7 +17,7 @@ export interface Reference {
 const grouped = (value: number) => value.toLocaleString('en');
 const handles = (components: number, chi: number) => components - chi / 2;
 
-/** Forgone volume over the area with springs, to three decimals. */
+/** Returns the volume that springs take, over the area. */
 const depth = (shown: ShownIn) => (shown('free')('volume') - shown('membrane')('volume')) / shown('membrane')('area');
 const stroke = (shown: ShownIn) => shown('truth')('largest') - shown('truth')('smallest');
 

@@ -42,7 +42,7 @@ export function judge(typed: string, expected: Expected): Verdict {
   const isNothing = value === 0 && values.includes(0);
   if (!fits && !isNothing) return unit ? wrong('lessons.unitWrong', { unit }) : wrong('lessons.noUnit');
   const verdict = compared(values, fits && given ? given.factor / asked.factor : 1, { ...expected, value });
-  // What is typed as it is shown here needs no note.
+  // A number typed as it is shown here needs no note.
   return verdict.says === rightAs(typed.trim()) ? { isRight: true, says: text('lessons.right') } : verdict;
 }
 
