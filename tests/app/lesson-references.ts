@@ -77,8 +77,8 @@ export const REFERENCES: Record<string, Record<string, Reference>> = {
     outliers: {
       stated: (shown) => [
         `${shown('outliers')('surfaceConstraints') - shown('cow')('surfaceConstraints')} more points`,
-        shown('cow')('meanCurvature').toFixed(2),
-        shown('outliers')('meanCurvature').toFixed(2),
+        shown('cow')('meanCurvature').toFixed(3),
+        shown('outliers')('meanCurvature').toFixed(3),
       ],
     },
   },
