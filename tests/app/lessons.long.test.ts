@@ -1,4 +1,4 @@
-/** The lessons with runs at full size, each to its end; `lessons.test.ts` does the two others. */
+/** The lessons with runs at full size, each to its end; `lesson-answers.test.ts` does their runs of some seconds. */
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { type App, openApp } from './browser';
 import { doLesson } from './lesson-steps';
@@ -10,7 +10,7 @@ beforeAll(async () => {
 });
 afterAll(() => app.close());
 
-test.each(['coarse-to-fine', 'forces', 'regularisation', 'heart'])(
+test.each(['coarse-to-fine', 'forces', 'regularisation', 'heart', 'topology'])(
   '%s is ticked step by step with its settings',
   { timeout: 900_000 },
   async (id) => {

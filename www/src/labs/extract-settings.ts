@@ -204,7 +204,7 @@ export class ExtractSettings {
         this.#ui.start.reject(message);
         if (code === 'internal') return this.#states.fail(text('labs.buildFailed'), error);
         this.#states.restore((state) => this.#results.describe(state));
-        if (running) this.#play();
+        if (running) await this.#play();
       }
     });
   }
@@ -217,7 +217,7 @@ export class ExtractSettings {
       const forget = this.checkpoint(text('labs.changeOf', { name: this.#ui.labelOf(name) }), name);
       try {
         this.#take(await this.#client.request('setParams', { [name]: value }));
-        this.#goOn();
+        await this.#goOn();
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
@@ -240,7 +240,7 @@ export class ExtractSettings {
         this.#attractors = attractors;
         this.#ui.stage.showAttractors(attractors);
         this.#onChange();
-        this.#goOn();
+        await this.#goOn();
       } catch (error) {
         forget();
         const { code, message } = toFailure(error);
@@ -311,12 +311,14 @@ export class ExtractSettings {
   }
 
   /** Resumes a converged run: under other forces it can move on. */
-  #goOn(): void {
-    if (this.#states.modelState === 'done') this.#play();
+  async #goOn(): Promise<void> {
+    if (this.#states.modelState === 'done') await this.#play();
   }
 
-  #play(): void {
-    this.#client.request('play', undefined).catch((error) => this.#states.fail(text('labs.requestFailed'), error));
+  #play(): Promise<unknown> {
+    return this.#client
+      .request('play', undefined)
+      .catch((error) => this.#states.fail(text('labs.requestFailed'), error));
   }
 
   #showPyramid({ levels }: StartChoice): void {

@@ -107,6 +107,8 @@ export abstract class LabShell<Example extends Listed> implements Lab {
     });
     this.opening.onReplaced = () => this.work.settled();
     this.states.subscribe((state) => this.#showState(state));
+    // Until a change is in force, the state and the measures are those of the run before it.
+    this.states.subscribeChanging((isChanging) => this.root.toggleAttribute('data-changing', isChanging));
     const onEscape = {
       key: 'Escape',
       shown: text('labs.keyEscape'),

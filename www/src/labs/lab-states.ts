@@ -18,6 +18,7 @@ export class LabStates {
   #opening = false;
   /** Settles when the last change queued by {@link enqueue} is complete. */
   #queue: Promise<unknown> = Promise.resolve();
+  readonly #changes = new Observable(0);
   /** Whether the worker has a model of the lab's data. */
   ready = false;
   /** Whether the worker has to be restarted before it can serve requests. */
@@ -36,6 +37,11 @@ export class LabStates {
       if (state !== 'loading' && state !== 'error') this.#model = state;
       subscriber(state);
     });
+  }
+
+  /** Calls `subscriber` now, and whenever changes begin or are complete, with whether changes are under way. */
+  subscribeChanging(subscriber: (isChanging: boolean) => void): void {
+    this.#changes.subscribe((count) => subscriber(count > 0));
   }
 
   get value(): LabState {
@@ -91,7 +97,10 @@ export class LabStates {
    * previous one.
    */
   enqueue(work: () => Promise<void>): Promise<void> {
-    const turn = this.#queue.then(work);
+    this.#changes.value += 1;
+    const turn = this.#queue.then(work).finally(() => {
+      this.#changes.value -= 1;
+    });
     this.#queue = turn.catch(() => undefined);
     return turn;
   }

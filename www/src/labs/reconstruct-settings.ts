@@ -150,7 +150,7 @@ export class ReconstructSettings {
       this.showParams(params);
       if (this.#states.modelState === 'done') {
         this.#results.startOver();
-        this.#play().catch((error) => this.#states.fail(text('labs.requestFailed'), error));
+        await this.#play().catch((error) => this.#states.fail(text('labs.requestFailed'), error));
       }
     } catch (error) {
       const { code, message } = toFailure(error);

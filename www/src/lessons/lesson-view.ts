@@ -7,13 +7,13 @@ import { shownValue } from './format';
 import type { Lesson, Step } from './lesson';
 import {
   completeSteps,
-  isAnswered,
   isComplete,
   loadProgress,
   type Progress,
   recordsOf,
   saveProgress,
   type Tick,
+  verdictOn,
 } from './progress';
 import { type LabReading, labelIn, labelOfExample, readLab, watchLab } from './reading';
 import { resultsFile } from './results';
@@ -35,6 +35,8 @@ export class LessonView {
   readonly #closing = new AbortController();
   /** Element with the present values of what the step's condition is about. */
   #now: HTMLElement | undefined;
+  /** Shows the verdict on the answer to the step's question. */
+  #judge: () => void = () => undefined;
 
   /** `address` is where the lesson comes from, for links to it. */
   constructor(lesson: Lesson, lab: HTMLElement, address: string) {
@@ -99,6 +101,7 @@ export class LessonView {
     const link = (name: 'lessons.back' | 'lessons.next', to: number) =>
       h('button', { type: 'button', disabled: !this.#lesson.steps[to], onclick: () => this.#go(to) }, text(name));
     this.#now = undefined;
+    this.#judge = () => undefined;
     this.#body.replaceChildren(
       ...(index === 0 ? [prose(this.#lesson.intro, this.#lesson.language)] : []),
       h(
@@ -149,6 +152,8 @@ export class LessonView {
     this.#save();
     this.#body.querySelector('.lesson-check')?.toggleAttribute('data-ticked', true);
     this.#news.textContent = text('lessons.tickedNews', { number: this.#progress.step + 1 });
+    // An answer may have waited for what was measured.
+    this.#judge();
     this.#test();
   }
 
@@ -186,19 +191,23 @@ export class LessonView {
         ? h('textarea', { rows: 6, ...attributes })
         : h('input', { type: 'text', inputmode: 'decimal', autocomplete: 'off', ...attributes });
     field.value = this.#progress.answers[step.id] ?? '';
-    const tell = (isAsked: boolean) => {
-      feedback.textContent = isAsked ? this.#feedback(step) : '';
-      feedback.toggleAttribute('data-right', isAsked && isAnswered(step, this.#progress));
+    this.#judge = () => {
+      const { isRight = false, says = '' } = verdictOn(step, this.#progress) ?? {};
+      feedback.textContent = says;
+      feedback.toggleAttribute('data-right', isRight);
     };
     const commit = () => {
       this.#progress.answers[step.id] = field.value;
       this.#save();
-      tell(true);
+      this.#judge();
+      if (field.value.trim() === '') feedback.textContent = text('lessons.empty');
     };
     field.addEventListener('change', commit);
-    tell(field.value !== '');
+    this.#judge();
     const label = text(step.question === 'text' ? 'lessons.keepAnswer' : 'lessons.checkAnswer');
-    const form = h('form', { class: 'lesson-answer' }, field, h('button', {}, label));
+    const { unit = undefined } = typeof step.question === 'object' ? step.question : {};
+    const after = unit === undefined ? [] : [h('span', {}, unit)];
+    const form = h('form', { class: 'lesson-answer' }, field, ...after, h('button', {}, label));
     form.addEventListener('submit', (event) => {
       event.preventDefault();
       commit();
@@ -206,11 +215,6 @@ export class LessonView {
     });
     part.append(form, feedback);
     return part;
-  }
-
-  #feedback(step: Step): string {
-    if (isAnswered(step, this.#progress)) return text(step.question === 'text' ? 'lessons.noted' : 'lessons.right');
-    return text(step.question === 'text' ? 'lessons.empty' : 'lessons.wrong');
   }
 
   /** Returns the controls below the steps: results, sheets, and a new start. */

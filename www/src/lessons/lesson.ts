@@ -3,13 +3,14 @@ import { labOf } from '../labs/address';
 import { text } from '../texts';
 import { checkData, checkSteps, checkText } from './bounds';
 import { type Check, checkProblem, type Operand, operandProblem } from './check';
+import { unitNamed } from './units';
 
 /** Headings within a step, in the order in which they are shown; `answer` is for teachers only. */
 export const PARTS = ['goal', 'do', 'watch', 'check', 'question', 'hint', 'explanation', 'answer'] as const;
 export type Part = (typeof PARTS)[number];
 
-/** Question of a step: for a number, or else for a text. */
-export type Question = { answer: Operand; within?: number } | 'text';
+/** Question of a step: for a number, in a unit or without one, or else for a text. */
+export type Question = { answer: Operand; within?: number; unit?: string } | 'text';
 
 /** A step as `lesson.json` states it. */
 interface StepData {
@@ -117,11 +118,19 @@ function parseJson(source: string): Record<string, unknown> {
 function stepProblem({ id, open, check, question }: Record<string, unknown>, before: string[]): string | undefined {
   if (typeof id !== 'string' || before.includes(id)) return text('lessons.stepId');
   if (open !== undefined && (typeof open !== 'string' || !labOf(`#${open}`))) return text('lessons.openInvalid');
-  if (question !== undefined && question !== 'text') {
-    const problem = operandProblem(Object(question).answer, [...before, id]);
-    if (problem) return text('lessons.questionInvalid', { problem });
-  }
+  const problem = question === undefined ? undefined : questionProblem(question, [...before, id]);
+  if (problem) return text('lessons.questionInvalid', { problem });
   return check === undefined ? undefined : checkProblem(check, before);
+}
+
+/** Returns what is wrong with a question, undefined if nothing. */
+function questionProblem(question: unknown, steps: string[]): string | undefined {
+  if (question === 'text') return undefined;
+  const { answer, within = 0, unit }: Record<string, unknown> = Object(question);
+  if (typeof answer === 'string' || typeof answer === 'boolean') return text('lessons.answerInvalid');
+  if (typeof within !== 'number' || !(within >= 0)) return text('lessons.withinInvalid');
+  if (unit !== undefined && !unitNamed(String(unit))) return text('lessons.unitUnknown');
+  return operandProblem(answer, steps);
 }
 
 interface LessonText {

@@ -1,6 +1,8 @@
 /** Progress of a student in a lesson, kept by the browser. */
 
+import { text } from '../texts';
 import { operandValue, type Records } from './check';
+import { judge, type Verdict } from './judge';
 import type { Lesson, Step } from './lesson';
 import type { Value } from './reading';
 
@@ -52,29 +54,21 @@ export function recordsOf({ ticks }: Progress): Records {
   return Object.fromEntries(Object.entries(ticks).map(([id, tick]) => [id, tick?.measures]));
 }
 
-/** A number with its digits in groups of three, and decimals with the other separator. */
-const GROUPED = /^(-?\d{1,3}([.,])\d{3}(?:\2\d{3})*)(?:(?!\2)[.,](\d+))?$/;
-
 /**
- * Returns the numbers that a student may mean, with a decimal point or comma, and a minus sign of either kind: the comma
- * of "15,540" begins decimals or groups digits.
+ * Returns the verdict on the answer to a step's question; undefined if there is no answer. Any text is right as an answer
+ * in words.
  */
-export function numbersFrom(typed: string): number[] {
-  const plain = typed.replace('−', '-').replace(/[\s'’]/g, '');
-  if (plain === '') return [];
-  const [, whole, , decimals = '0'] = GROUPED.exec(plain) ?? [];
-  const readings = [plain.replace(',', '.')];
-  if (whole) readings.push(`${whole.replace(/[.,]/g, '')}.${decimals}`);
-  return readings.map(Number).filter((one) => !Number.isNaN(one));
+export function verdictOn({ id, question }: Step, progress: Progress): Verdict | undefined {
+  const typed = progress.answers[id]?.trim() ?? '';
+  if (!question || typed === '') return undefined;
+  if (question === 'text') return { isRight: true, says: text('lessons.noted') };
+  const value = operandValue(question.answer, recordsOf(progress));
+  return judge(typed, { ...question, value: value === undefined ? undefined : Number(value) });
 }
 
-/** Tests whether the answer to a step's question is right; any text is right as an answer in words. */
-export function isAnswered({ id, question }: Step, progress: Progress): boolean {
-  const typed = progress.answers[id]?.trim() ?? '';
-  if (!question || question === 'text') return !question || typed !== '';
-  const expected = Number(operandValue(question.answer, recordsOf(progress)));
-  const { within = 0 } = question;
-  return numbersFrom(typed).some((number) => Math.abs(number - expected) <= within);
+/** Tests whether there is no question, or its answer is right. */
+export function isAnswered(step: Step, progress: Progress): boolean {
+  return !step.question || verdictOn(step, progress)?.isRight === true;
 }
 
 /** Tests whether a step is complete: its condition was true, and its question is answered. */

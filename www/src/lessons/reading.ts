@@ -7,6 +7,7 @@ export type Value = number | string | boolean;
 export interface LabReading {
   /** The lab's name in addresses. */
   lab: string;
+  /** The lab's state; `running` also while a change is not in force yet, and what is shown is of the run before it. */
   state: string;
   /** Id of the open example; empty for the user's own file. */
   example: string;
@@ -24,7 +25,7 @@ const isValue = (value: unknown): value is Value => ['number', 'string', 'boolea
 export function readLab(root: HTMLElement): LabReading {
   return {
     lab: labOf(location.hash) ?? '',
-    state: root.dataset.state ?? '',
+    state: root.dataset.changing === undefined ? (root.dataset.state ?? '') : 'running',
     example: root.querySelector<HTMLSelectElement>('.data select')?.value ?? '',
     params: paramsIn(root),
     measures: measuresIn(root),
@@ -95,7 +96,7 @@ export function watchLab(root: HTMLElement, signal: AbortSignal, callback: () =>
     pending = requestAnimationFrame(callback);
   };
   const watch = new MutationObserver(note);
-  watch.observe(root, { subtree: true, attributeFilter: ['data-state', 'data-measures'] });
+  watch.observe(root, { subtree: true, attributeFilter: ['data-state', 'data-changing', 'data-measures'] });
   // A parameter that changes while the lab is paused.
   root.addEventListener('change', note, { signal });
   signal.addEventListener('abort', () => {

@@ -43,10 +43,13 @@ function fill(sheet: HTMLElement, lesson: Lesson, forTeachers: boolean): void {
 
 function teacherParts(step: Step): HTMLElement[] {
   const { open, question } = step;
-  const expected = typeof question === 'object' && typeof question.answer !== 'object' ? question.answer : undefined;
+  const { answer = undefined, unit = '' } = typeof question === 'object' ? question : {};
+  const expected = typeof answer === 'object' ? undefined : answer;
   return [
     ...Object.values(partsOf(step, 'teacher')),
-    ...(expected === undefined ? [] : [h('p', {}, text('lessons.expected', { value: shownValue(expected) }))]),
+    ...(expected === undefined
+      ? []
+      : [h('p', {}, text('lessons.expected', { value: `${shownValue(expected)} ${unit}`.trim() }))]),
     ...(open ? [h('p', {}, h('a', { class: 'link', href: `./#${open}` }, text('lessons.openState')))] : []),
   ];
 }
