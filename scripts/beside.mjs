@@ -18,3 +18,10 @@ export async function filesBeside(path) {
   }
   return files;
 }
+
+/** Returns the paths of the files in a folder and its subfolders whose names match, in order. */
+export async function filesBelow(folder, names) {
+  const entries = await readdir(folder, { recursive: true, withFileTypes: true });
+  const files = entries.filter((entry) => entry.isFile() && names.test(entry.name));
+  return files.map((entry) => join(entry.parentPath, entry.name)).sort();
+}

@@ -2,6 +2,7 @@
 // proposed is moved by a fifth of the diagonal of the mesh, away from its middle, and back. Prints a row for each mesh.
 import { readdir, readFile } from 'node:fs/promises';
 import { basename, dirname, join, relative } from 'node:path';
+import { filesBelow } from './beside.mjs';
 import { at } from './shell.mjs';
 
 const MESHES = /\.(obj|ply|stl|glb|gltf)$/i;
@@ -45,7 +46,7 @@ export async function reportMeshes(library, folder, line) {
     ),
   );
   let isSound = true;
-  for (const path of await meshesIn(folder)) {
+  for (const path of await filesBelow(folder, MESHES)) {
     const name = relative(folder, path) || basename(path);
     try {
       const files = await filesIn(dirname(path));
@@ -65,14 +66,6 @@ export async function reportMeshes(library, folder, line) {
     }
   }
   return isSound;
-}
-
-async function meshesIn(folder) {
-  const entries = await readdir(folder, { recursive: true, withFileTypes: true });
-  return entries
-    .filter((one) => one.isFile() && MESHES.test(one.name))
-    .map((one) => join(one.parentPath, one.name))
-    .sort();
 }
 
 async function filesIn(folder) {

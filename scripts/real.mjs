@@ -1,14 +1,16 @@
 // Runs the deformable model at its default settings on every volume of a folder: `npm run real -- FOLDER [--levels N]
-// [--pipeline]`, or on every mesh the multiresolution model, with `--meshes`; by default on the example volumes. Prints a row for each volume and iso value and, with --pipeline,
+// [--pipeline]`; by default on the example volumes. Prints a row for each volume and iso value and, with --pipeline,
 // the figures of flying edges and isotropic remeshing below it. Ends with 1 if a surface intersects itself, or if
-// recall or precision is below 99 %.
-import { readdir, readFile } from 'node:fs/promises';
-import { basename, join, relative } from 'node:path';
+// recall or precision is below 99 %. With `--meshes`, `--clouds` or `--sequences` it runs one of the other three methods.
+import { readFile } from 'node:fs/promises';
+import { basename, relative } from 'node:path';
 import { parseArgs } from 'node:util';
-import { filesBeside } from './beside.mjs';
+import { filesBelow, filesBeside } from './beside.mjs';
 import { build } from './build.mjs';
 import { pipelineLine, pipelineOf } from './pipeline.mjs';
+import { reportClouds } from './real-clouds.mjs';
 import { reportMeshes } from './real-meshes.mjs';
+import { reportSequences } from './real-sequences.mjs';
 import { at, say, script, startedAs } from './shell.mjs';
 
 const VOLUMES = /\.(nii|nii\.gz|nrrd|nhdr|mha|mhd)$/;
@@ -22,13 +24,6 @@ const SMALLEST = 8;
 
 /** Width of the first column, in characters. */
 const LONGEST_NAME = 54;
-
-/** Returns the paths of all volumes in a folder and its subfolders. */
-async function volumesIn(folder) {
-  const entries = await readdir(folder, { recursive: true, withFileTypes: true });
-  const files = entries.filter((entry) => entry.isFile() && VOLUMES.test(entry.name));
-  return files.map((entry) => join(entry.parentPath, entry.name)).sort();
-}
 
 function smoothed(histogram) {
   const reach = 3 * SMOOTHING;
@@ -174,6 +169,13 @@ async function report(library, path, name, { levels, pipeline }) {
   return rows;
 }
 
+/** Returns the report of the method that the options name, if it is not that of volumes. */
+function otherReport({ meshes, clouds, sequences }) {
+  if (meshes) return reportMeshes;
+  if (clouds) return reportClouds;
+  return sequences ? reportSequences : undefined;
+}
+
 if (startedAs(import.meta.url)) {
   await script(async () => {
     await build();
@@ -185,11 +187,15 @@ if (startedAs(import.meta.url)) {
         levels: { type: 'string', default: '0' },
         pipeline: { type: 'boolean', default: false },
         meshes: { type: 'boolean', default: false },
+        clouds: { type: 'boolean', default: false },
+        sequences: { type: 'boolean', default: false },
       },
     });
-    const [folder = at('www/public/data')] = positionals;
-    if (values.meshes) {
-      if (!(await reportMeshes(library, folder, line))) process.exitCode = 1;
+    const [given] = positionals;
+    const folder = given ?? at('www/public/data');
+    const other = otherReport(values);
+    if (other) {
+      if (!(await other(library, values.meshes ? folder : given, line))) process.exitCode = 1;
       return;
     }
     process.stdout.write(
@@ -199,7 +205,7 @@ if (startedAs(import.meta.url)) {
       ),
     );
     const rows = [];
-    for (const path of await volumesIn(folder)) {
+    for (const path of await filesBelow(folder, VOLUMES)) {
       const name = relative(folder, path) || basename(path);
       rows.push(...(await report(library, path, name, { ...values, levels: Number(values.levels) })));
     }
