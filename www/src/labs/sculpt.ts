@@ -1,7 +1,7 @@
 import { SculptClient } from '../sculpt/client';
 import type { SculptExample } from '../sculpt/examples';
 import { lastFrame } from '../sculpt/film';
-import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
+import { isSculptPreset, poseOf, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
 import type { FrameContents, FrameEvent, ParamValues, SculptQuantity, Support, WorkerEvent } from '../sculpt/protocol';
 import { contentOf } from '../session/recognise';
 import type { ContentOf } from '../session/schema';
@@ -119,6 +119,7 @@ export class SculptLab extends RunLab<SculptExample> {
       pose,
       names: example?.names ?? [],
       posed: linked?.pose !== undefined,
+      opensPosed: poseOf(example) !== undefined,
       film,
       params,
     });
