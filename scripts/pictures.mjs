@@ -7,7 +7,11 @@ import { at, say, script, startedAs } from './shell.mjs';
 
 /** Size of the page in pictures. */
 export const SIZE = { width: 1440, height: 900 };
-/** Pictures with many small dots are JPEG, a third as large. */
+/**
+ * Pictures with many small dots are JPEG, a third as large.
+ *
+ * @type {{ file: string, hash: string, part?: string, prepare?: (page: any) => Promise<void>, type?: string, quality?: number }[]}
+ */
 export const PICTURES = [
   { file: 'docs/extract.png', hash: '#extract' },
   { file: 'docs/reconstruct.jpg', hash: '#reconstruct', type: 'jpeg', quality: 85 },

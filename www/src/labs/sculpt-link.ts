@@ -82,8 +82,10 @@ export function linkOf(settings: SceneSettings): LinkedScene {
 }
 
 /** Adds the other edge length to one that is in a link: without it, the model would choose it to suit. */
-function withBothEdges(linked: ParamValues, { edgeMin, edgeMax }: ParamValues): ParamValues {
-  return 'edgeMin' in linked || 'edgeMax' in linked ? { ...linked, edgeMin, edgeMax } : linked;
+function withBothEdges(linked: ParamValues, params: ParamValues): ParamValues {
+  const edges = ['edgeMin', 'edgeMax'];
+  if (!edges.some((name) => name in linked)) return linked;
+  return Object.fromEntries(Object.entries(params).filter(([name]) => name in linked || edges.includes(name)));
 }
 
 /**

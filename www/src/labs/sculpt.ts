@@ -180,6 +180,7 @@ export class SculptLab extends RunLab<SculptExample> {
   #showSettings(): void {
     const { params, pose, support } = this.#settings;
     this.ui.showSupport(support);
+    this.#results.support = support;
     const example = this.opening.source?.example;
     const preset = isSculptPreset(example) ? example : undefined;
     this.ui.showParams(params, preset, preset && variantInForce(preset, pose, params, this.#usual));
