@@ -101,7 +101,7 @@ test('placeholders are replaced, a missing value is an error, and numbers choose
 
 /** Sections that are still partly in English. */
 const UNTRANSLATED = [
-  ...['shell', 'lessons', 'bench', 'segment', 'track', 'trackPanels', 'pointPanels'],
+  ...['shell', 'lessons', 'bench', 'segment', 'pointPanels'],
   ...['extractPresets', 'reconstructPresets', 'trackPresets', 'sculptPresets'],
 ];
 
