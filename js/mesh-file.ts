@@ -1,6 +1,7 @@
 // Options of reading mesh files, and of what is stated in written ones.
 import { checkProperties, choice, invalid } from './check.js';
 import type { LengthUnit, MeshExtra, MeshFileOptions, MeshTexture, NamedFile, Space, SpaceOptions } from './data.js';
+import { VesicleError } from './error.js';
 import { checkedNamedFiles } from './input-file.js';
 import { checkTexture } from './texture.js';
 import type { Warning } from './warning.js';
@@ -45,6 +46,16 @@ export function checkedSpaceOptions(
 export function checkStated({ space, unit }: MeshFrame): void {
   if (space !== undefined) choice('space', space, SPACES);
   if (unit !== undefined) choice('unit', unit, UNITS);
+}
+
+/** Calls a function that reads a mesh; an error about compressed glTF also says what decompresses it. */
+export function sayingHow<T>(read: () => T): T {
+  try {
+    return read();
+  } catch (error) {
+    if (!(error instanceof VesicleError && /without Draco or meshopt/.test(error.message))) throw error;
+    throw new VesicleError(error.code, `${error.message}, or decompress it before by decompressGltf of vesicle/gltf`);
+  }
 }
 
 /** Returns the options of reading a mesh file; throws `invalid-argument` naming the one that is wrong. */

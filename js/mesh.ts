@@ -31,6 +31,7 @@ import {
   frameOf,
   type MeshFrame,
   SPACE_OPTIONS,
+  sayingHow,
   stated,
 } from './mesh-file.js';
 import { call, Handle } from './runtime.js';
@@ -304,10 +305,12 @@ export class Mesh {
   static parse(bytes: Uint8Array, options?: MeshFileOptions): Mesh {
     typedArray('bytes', bytes, Uint8Array);
     const { texture, files } = checkedFileOptions(options);
-    const file = call(() => {
-      const beside = files.map(({ name, bytes }) => new glue.NamedFile(name, bytes));
-      return glue.RawMeshFile.parse(bytes, rawTexture(texture), beside);
-    });
+    const file = sayingHow(() =>
+      call(() => {
+        const beside = files.map(({ name, bytes }) => new glue.NamedFile(name, bytes));
+        return glue.RawMeshFile.parse(bytes, rawTexture(texture), beside);
+      }),
+    );
     const facts = call(() => stated(file));
     return made(() => RawMesh.fromFile(file), facts);
   }

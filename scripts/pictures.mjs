@@ -1,13 +1,17 @@
 // Takes the pictures of the README and the docs from the running app, of labs whose examples are done: `npm run pictures`. The
 // controls in each are kept in docs/pictures.json; a test of the app fails when the app has other ones, and pictures are outdated.
-import { mkdir, writeFile } from 'node:fs/promises';
+import { mkdir, readFile, writeFile } from 'node:fs/promises';
 import { launchChromium } from './chromium.mjs';
 import { serveApp } from './serve.mjs';
 import { at, say, script, startedAs } from './shell.mjs';
 
 /** Size of the page in pictures. */
 export const SIZE = { width: 1440, height: 900 };
-/** Pictures with many small dots are JPEG, a third as large. */
+/**
+ * Pictures with many small dots are JPEG, a third as large.
+ *
+ * @type {{ file: string, hash: string, part?: string, prepare?: (page: any) => Promise<void>, type?: string, quality?: number }[]}
+ */
 export const PICTURES = [
   { file: 'docs/extract.png', hash: '#extract' },
   { file: 'docs/reconstruct.jpg', hash: '#reconstruct', type: 'jpeg', quality: 85 },
@@ -16,13 +20,34 @@ export const PICTURES = [
   { file: 'docs/segment.jpg', hash: '#segment', type: 'jpeg', quality: 85 },
   // The 3D view alone, with uncovered parts marked: for the paper's model, and for the defaults.
   {
-    file: 'docs/coverage-paper.jpg',
+    ...{ file: 'docs/coverage-paper.jpg', type: 'jpeg', quality: 85, part: '.view', prepare: measureCoverage },
     hash: '#extract?start=enclosing&p.adaptivity=0&p.integrator=euler&v=2',
-    coverage: true,
-    type: 'jpeg',
-    quality: 85,
   },
-  { file: 'docs/coverage-default.jpg', hash: '#extract', coverage: true, type: 'jpeg', quality: 85 },
+  {
+    ...{ file: 'docs/coverage-default.jpg', type: 'jpeg', quality: 85, part: '.view', prepare: measureCoverage },
+    hash: '#extract',
+  },
+  // Failures of the methods at the defaults, and a mesh of the user's before and after.
+  {
+    ...{ file: 'docs/fails-extract.jpg', type: 'jpeg', quality: 85, part: '.view' },
+    ...{ hash: '#extract?example=linked-rings&v=2', prepare: (page) => dropData(page, plate()) },
+  },
+  {
+    ...{ file: 'docs/fails-reconstruct.jpg', type: 'jpeg', quality: 85, part: '.view' },
+    ...{ hash: '#reconstruct?example=two-balls', prepare: (page) => dropData(page, bowl()) },
+  },
+  {
+    ...{ file: 'docs/fails-track.jpg', type: 'jpeg', quality: 85, part: '.view' },
+    hash: '#track?example=ventricle&box=6,6,6,44,64,64',
+  },
+  {
+    ...{ file: 'docs/own-mesh.jpg', type: 'jpeg', quality: 85, part: '.view' },
+    ...{ hash: '#sculpt?example=globe', prepare: (page) => dropData(page, bust()) },
+  },
+  {
+    ...{ file: 'docs/fails-sculpt.jpg', type: 'jpeg', quality: 85, part: '.view' },
+    ...{ hash: '#sculpt?example=globe', prepare: stopEllipsoid },
+  },
 ];
 
 /** Names of the controls and headings that a picture of the page shows, from top to bottom, without numbers. */
@@ -38,18 +63,91 @@ export function visibleControls(page) {
   });
 }
 
+async function measureCoverage(page) {
+  await page.getByRole('button', { name: 'Measure coverage' }).click();
+  await page.getByText('Recall').waitFor({ timeout: 120_000 });
+}
+
+/** Returns two balls with an oblique plate between them that is .8 voxels thick, as a NIfTI file. */
+async function plate() {
+  const { default: init, Volume } = await import('../pkg/index.js');
+  await init();
+  const size = 64;
+  const data = new Uint8Array(size ** 3);
+  // Coverage of the voxel by the object, for an edge that is a voxel wide.
+  const share = (distance) => Math.min(1, Math.max(0, 0.5 - distance));
+  for (let z = 0, at = 0; z < size; z++)
+    for (let y = 0; y < size; y++)
+      for (let x = 0; x < size; x++, at++) {
+        const balls = [16, 48].map((middle) => Math.hypot(x - middle, y - 32, z - middle) - 9);
+        const wall = Math.max(
+          Math.abs(0.8 * x - 0.6 * z - 6.4 - 0.13 * (y - 32)) - 0.4,
+          Math.hypot(x - 32, y - 32, z - 32) - 24,
+        );
+        data[at] = Math.round(200 * Math.max(...balls.map(share), share(wall)));
+      }
+  return { name: 'plate.nii', bytes: new Volume({ data, dims: [size, size, size] }).toNifti() };
+}
+
+/** Returns points on both sides of a bowl whose wall is five times as thick as their noise. */
+async function bowl() {
+  let seed = 7;
+  const random = () => {
+    seed = (seed * 1664525 + 1013904223) >>> 0;
+    return seed / 2 ** 32;
+  };
+  const normal = () => Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random());
+  const point = (_, index) => {
+    const [height, turn] = [-random(), 2 * Math.PI * random()];
+    const flat = Math.sqrt(1 - height ** 2);
+    const radius = index % 2 === 0 ? 1 : 0.9;
+    return [flat * Math.cos(turn), flat * Math.sin(turn), height].map((x) => radius * x + 0.02 * normal()).join(' ');
+  };
+  const text = Array.from({ length: 5000 }, point).join('\n');
+  return { name: 'bowl.xyz', bytes: new TextEncoder().encode(text) };
+}
+
+async function bust() {
+  return { name: 'bust.ply', bytes: await readFile(at('www/public/data/nefertiti.ply')) };
+}
+
+/** Opens data as a file that is dropped on the page, and waits until it is done. */
+async function dropData(page, data) {
+  const { name, bytes } = await data;
+  const base64 = Buffer.from(bytes).toString('base64');
+  await page.evaluate(
+    ({ name, base64 }) => {
+      const transfer = new DataTransfer();
+      transfer.items.add(new File([Uint8Array.from(atob(base64), (one) => one.charCodeAt(0))], name));
+      for (const type of ['dragover', 'drop'])
+        window.dispatchEvent(new DragEvent(type, { dataTransfer: transfer, bubbles: true, cancelable: true }));
+    },
+    { name, base64 },
+  );
+  await page.waitForFunction((name) => document.querySelector('.facts')?.textContent?.includes(name), name);
+  await page.waitForSelector('[data-state=done]', { timeout: 120_000 });
+}
+
+/** Opens a mesh, and moves an ellipsoid further than its surface can follow. */
+async function stopEllipsoid(page) {
+  await dropData(page, bust());
+  await page.click('[data-ellipsoid="1"]');
+  const field = page.locator('.numbers input').first();
+  await field.fill(String(Number(await field.inputValue()) + 200));
+  await field.press('Enter');
+  await page.getByText('handle-stopped').or(page.locator('.warnings li')).first().waitFor({ timeout: 120_000 });
+  await page.waitForSelector('[data-state=done]', { timeout: 120_000 });
+}
+
 /** Waits for the example to be done, then for the frame that shows it, and takes the picture. Returns the controls in it. */
-async function shoot(page, address, { hash, file, coverage = false, ...format }) {
+async function shoot(page, address, { hash, file, part, prepare, ...format }) {
   await page.goto(address + hash);
   await page.waitForSelector('[data-state=done]', { timeout: 120_000 });
-  if (coverage) {
-    await page.getByRole('button', { name: 'Measure coverage' }).click();
-    await page.getByText('Recall').waitFor({ timeout: 120_000 });
-  }
+  await prepare?.(page);
   await page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
-  await (coverage ? page.locator('.view') : page).screenshot({ path: at(file), ...format });
+  await (part ? page.locator(part) : page).screenshot({ path: at(file), ...format });
   say('picture', at(file));
-  return coverage ? [] : visibleControls(page);
+  return part ? [] : visibleControls(page);
 }
 
 async function takePictures() {

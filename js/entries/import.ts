@@ -19,7 +19,7 @@ import type {
   VoxelArray,
 } from '../data.js';
 import { MeshFile, NamedFile, VolumeFile } from '../files.js';
-import { checkedFileOptions, stated } from '../mesh-file.js';
+import { checkedFileOptions, sayingHow, stated } from '../mesh-file.js';
 import { parsePoints as points } from '../points.js';
 import { call, restart } from '../runtime.js';
 import { rawTexture, textureOf } from '../texture.js';
@@ -71,10 +71,12 @@ export function parseVolume(bytes: Uint8Array, options?: VolumeFileOptions): Vol
 export function parseMesh(bytes: Uint8Array, options?: MeshFileOptions): MeshData {
   typedArray('bytes', bytes, Uint8Array);
   const { texture, files } = checkedFileOptions(options);
-  return inOwnInstance(() => {
-    const beside = files.map(({ name, bytes }) => new NamedFile(name, bytes));
-    return meshData(MeshFile.parse(bytes, rawTexture(texture), beside));
-  });
+  return sayingHow(() =>
+    inOwnInstance(() => {
+      const beside = files.map(({ name, bytes }) => new NamedFile(name, bytes));
+      return meshData(MeshFile.parse(bytes, rawTexture(texture), beside));
+    }),
+  );
 }
 
 /**

@@ -83,6 +83,7 @@ test('a texture for a file without coordinates, and compressed files', async () 
   const error = failure(() => Mesh.parse(packed));
   expect(error.code).toBe('bad-file');
   expect(error.message).toMatch(/KHR_draco_mesh_compression .*save the mesh again without Draco/);
+  expect(error.message).toContain('decompressGltf of vesicle/gltf');
 });
 
 /** Loads a GLB with three.js. Images cannot be decoded outside a browser, so meshes have none here. */

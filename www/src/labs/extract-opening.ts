@@ -8,7 +8,7 @@ import type { ContentOf } from '../session/schema';
 import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
-import type { StartChoice } from '../ui/start';
+import { type StartChoice, USUAL_START } from '../ui/start';
 import { fetchBytes, preload } from './downloads';
 import type { ExtractParts } from './extract-parts';
 import type { ExtractResults } from './extract-results';
@@ -135,7 +135,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     this.states.ready = true;
     this.#ui.adopt(volume, source, labels);
     if (source.linked?.color) this.#ui.options.set({ color: source.linked.color });
-    this.#settings.adopt(volume, choice, params, setup.attractors);
+    this.#settings.adopt(volume, choice, params, setup);
     if (moments) return this.#resume(moments, source.session && contentOf(source.session, 'extract').view);
     this.#settings.checkpoint(text('labs.play'));
     await this.#client.request('play', undefined);
@@ -199,12 +199,12 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
 
   /**
    * Returns the settings for a model of an example or of the user's file: an example's own parameters; for a file,
-   * those in force except the iso value, which is specific to a volume; for a volume larger than memory the defaults;
-   * without attractors. A link's settings take precedence.
+   * those in force except the iso value, which is specific to a volume; for a volume larger than memory, and for the
+   * file of a link, which leaves them out, the defaults; without attractors. A link's settings take precedence.
    */
   #setupFor({ example, linked }: ExtractSource, volume: ImageSource, choice: StartChoice): Setup {
     const { iso: _, ...params } = this.#settings.params;
-    const own = 'zarr' in volume ? {} : params;
+    const own = 'zarr' in volume || linked ? {} : params;
     const wanted: ParamValues = { ...(example?.params ?? own), ...linked?.params };
     const setup = this.#settings.setup(choice, wanted, linked?.attractors ?? []);
     if (linked?.sphere && choice.kind === 'sphere') setup.start = { kind: 'sphere', ...linked.sphere };
@@ -214,8 +214,8 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
   /**
    * Returns the choice of the initial surface: an example's own; for a file the one in force, but with the contour
    * (kind 'contour') in place of a sphere, and with an edge length that the model chooses, since positions and lengths
-   * are specific to a volume; for a volume larger than memory always the contour, and one finer level. A link's settings
-   * take precedence.
+   * are specific to a volume; for a volume larger than memory always the contour, and one finer level; for the file of
+   * a link the usual one. A link's settings take precedence.
    */
   #startFor({ example, linked }: ExtractSource, volume: ImageSource): StartChoice {
     const choice = this.#ui.start.value;
@@ -226,7 +226,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     const suits: StartChoice = example
       ? { ...choice, ...defaultStart(example), levels: example.levels, edge: example.edge }
       : own;
-    return linked ? withLink(suits, linked) : suits;
+    return linked ? withLink(example ? suits : USUAL_START, linked) : suits;
   }
 }
 

@@ -1,6 +1,6 @@
 import { type Client, toFailure } from '../client';
 import type { Preset, Variant } from '../presets';
-import type { Attractor, ParamValues, SavedRun, Setup, StartShape, Vec3, VolumeView } from '../protocol';
+import type { Attractor, ParamValues, SavedRun, Setup, StartShape, VolumeView } from '../protocol';
 import type { Moments } from '../session/moments';
 import { plural, text } from '../texts';
 import type { HistoryMark } from '../ui/history';
@@ -30,6 +30,14 @@ interface PageState {
   mark: (iteration: number) => HistoryMark;
 }
 
+type Sphere = Omit<Extract<StartShape, { kind: 'sphere' }>, 'kind'>;
+
+const sphereIn = (start: StartShape): Sphere | undefined => {
+  if (start.kind !== 'sphere') return undefined;
+  const { center, radius } = start;
+  return { center, radius };
+};
+
 export type ExtractMoments = Moments<SavedMoment<PageState, SavedRun>>;
 
 /**
@@ -44,6 +52,8 @@ export class ExtractSettings {
   readonly #onChange: () => void;
   readonly #undo: UndoHistory<PageState, SavedRun>;
   #volume: VolumeView | undefined;
+  /** The sphere that the model began as; undefined if it began otherwise. */
+  #sphere: Sphere | undefined;
   /** The parameters in force; rebuilding the model keeps them. */
   #params: ParamValues = {};
   /** The model's attractors; the list on the page may contain one whose request is pending. */
@@ -74,11 +84,13 @@ export class ExtractSettings {
     return this.#attractors;
   }
 
-  /**
-   * Sphere around the crosshair, in world units, that the model starts from if the user chooses a sphere as initial
-   * surface.
-   */
-  get sphere(): { center: Vec3; radius: number } {
+  /** The sphere, in world units, that the model began as or, if it began otherwise, the one around the crosshair. */
+  get sphere(): Sphere {
+    return this.#sphere ?? this.#sphereHere;
+  }
+
+  /** The sphere around the crosshair, from which a new model starts if the user chooses a sphere as initial surface. */
+  get #sphereHere(): Sphere {
     return { center: this.#ui.stage.crosshair, radius: SPHERE_PART * this.#smallestSide };
   }
 
@@ -102,8 +114,11 @@ export class ExtractSettings {
   /**
    * Takes over the settings of a newly opened volume, whose model the worker has built, and clears the undo history.
    */
-  adopt(volume: VolumeView, choice: StartChoice, params: ParamValues, attractors: Attractor[]): void {
+  adopt(volume: VolumeView, choice: StartChoice, params: ParamValues, { start, attractors }: Setup): void {
     this.#volume = volume;
+    this.#sphere = sphereIn(start);
+    // A reset takes the crosshair's.
+    if (this.#sphere) this.#ui.stage.goTo(this.#sphere.center);
     this.#undo.clear();
     this.#ui.attractors.radius = ATTRACTOR_PART * this.#smallestSide;
     this.#ui.coverage.size = this.#smallestSide;
@@ -268,6 +283,7 @@ export class ExtractSettings {
   /** Restores the page to a saved state that the model has already been restored to. */
   adoptMoment({ saved, page }: SavedMoment<PageState, SavedRun>): void {
     this.#ui.start.show(page.choice);
+    this.#sphere = saved.log && sphereIn(saved.log.setup.start);
     this.#attractors = page.attractors;
     this.#ui.showAttractors(page.attractors);
     this.#results.rewind(page.mark(saved.iteration));
@@ -293,7 +309,9 @@ export class ExtractSettings {
 
   async #rebuild(choice: StartChoice, params: ParamValues): Promise<void> {
     this.#states.load(text('labs.resetting'));
-    const ready = await this.#client.request('rebuild', this.setup(choice, params));
+    const setup = this.setup(choice, params);
+    const ready = await this.#client.request('rebuild', setup);
+    this.#sphere = sphereIn(setup.start);
     this.begin(choice, ready.params);
   }
 
@@ -344,7 +362,7 @@ export class ExtractSettings {
       case 'bubbles':
         return { kind, count: bubbles };
       case 'sphere':
-        return { kind, ...this.sphere };
+        return { kind, ...this.#sphereHere };
       default:
         return { kind };
     }

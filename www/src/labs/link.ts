@@ -1,6 +1,5 @@
 /** Converts the Extract lab's settings to the hash of an address, `#extract?…`, and back. */
 import { EXAMPLES, type Example } from '../examples';
-import { shortenedPoint } from '../placing';
 import { defaultStart, exampleById, isPreset, PAPER } from '../presets';
 import type { Attractor, ParamValues, Vec3 } from '../protocol';
 import { isStartKind, type StartChoice } from '../ui/start';
@@ -8,8 +7,6 @@ import type { ColorMode } from '../ui/view-options';
 import { listsIn, numbersIn, paramsIn, queryOf, textsIn } from './link-query';
 
 export const ADDRESS = '#extract';
-/** Significant digits of a sphere, which is about a tenth of the volume: finer than any click. */
-const DIGITS = 7;
 /** Most attractors that a link includes: some programs truncate long addresses. */
 export const MOST_ATTRACTORS = 100;
 
@@ -49,7 +46,7 @@ export interface LabSettings {
   /** Index of the open frame. */
   frame: number;
   choice: StartChoice;
-  /** Sphere around the crosshair, in world units, that is the initial surface if a sphere is chosen. */
+  /** The sphere, in world units, that is the initial surface if a sphere is chosen. */
   sphere: { center: Vec3; radius: number };
   params: ParamValues;
   /** Default parameters of the method; the link contains only parameters that differ. */
@@ -73,18 +70,13 @@ export function linkOf(settings: LabSettings): Linked {
     ...(frame > 0 && { frame }),
     ...(choice.kind !== start.kind && { start: choice.kind }),
     ...(choice.kind === 'bubbles' && choice.bubbles !== bubbles && { bubbles: choice.bubbles }),
-    ...(choice.kind === 'sphere' && { sphere: short(sphere) }),
+    ...(choice.kind === 'sphere' && { sphere }),
     ...(choice.levels !== usual.levels && { levels: choice.levels }),
     ...(choice.edge !== usual.edge && { edge: choice.edge ?? 0 }),
     params: differing(params, { ...defaults, ...example?.params }),
     attractors: attractors.length <= MOST_ATTRACTORS ? attractors : [],
     ...(color !== 'plain' && { color }),
   };
-}
-
-/** Rounds a sphere to what a link needs. */
-function short({ center, radius }: LabSettings['sphere']): LabSettings['sphere'] {
-  return { center: shortenedPoint(center, DIGITS, 10 * radius), radius: Number(radius.toPrecision(DIGITS)) };
 }
 
 /** Returns the entries of `values` that differ from those in `usual`, for a link that omits the others. */
@@ -102,19 +94,16 @@ export function withLink(choice: StartChoice, { start, bubbles, levels, edge }: 
   };
 }
 
-// All digits but those that rounding has left, such as those of 0.1 + 0.2.
-const numbers = (values: number[]) => values.map((value) => Number(value.toPrecision(15))).join(',');
-
-/** Converts the settings in a link to the hash of an address. */
+/** Converts the settings in a link to the hash of an address, with all digits, which give the same surface to the bit. */
 export function toHash(linked: Linked): string {
   const query = new URLSearchParams();
   const { example, file, frame, start, bubbles, sphere, levels, edge, params, attractors, color } = linked;
   for (const [name, value] of Object.entries({ example, file, frame, start, bubbles, levels, edge, color }))
     if (value !== undefined) query.set(name, String(value));
-  if (sphere) query.set('sphere', numbers([...sphere.center, sphere.radius]));
+  if (sphere) query.set('sphere', [...sphere.center, sphere.radius].join(','));
   for (const [name, value] of Object.entries(params)) query.set(`p.${name}`, String(value));
   for (const { point, strength, radius } of attractors)
-    query.append('attractor', numbers([...point, strength, radius]));
+    query.append('attractor', [...point, strength, radius].join(','));
   if (query.size > 0) query.set('v', VERSION);
   const text = query.toString().replaceAll('%2C', ',');
   return text ? `${ADDRESS}?${text}` : ADDRESS;

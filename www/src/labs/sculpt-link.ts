@@ -71,7 +71,7 @@ export function linkOf(settings: SceneSettings): LinkedScene {
   return {
     ...(!example && { file, support }),
     ...(example && example !== SCENES[0] && { example: example.id }),
-    params: differing(params, usual),
+    params: withBothEdges(differing(params, usual), params),
     ...(support === 'surface' && (own || pose) && fits(start) && { rest: start }),
     ...(pose && fits(pose) && { pose }),
     ...(own && { keys: film.keys, between: film.between }),
@@ -79,6 +79,13 @@ export function linkOf(settings: SceneSettings): LinkedScene {
     ...(color !== (example?.color ?? 'plain') && { color }),
     ...(layout !== (example?.layout ?? 'result') && { layout }),
   };
+}
+
+/** Adds the other edge length to one that is in a link: without it, the model would choose it to suit. */
+function withBothEdges(linked: ParamValues, params: ParamValues): ParamValues {
+  const edges = ['edgeMin', 'edgeMax'];
+  if (!edges.some((name) => name in linked)) return linked;
+  return Object.fromEntries(Object.entries(params).filter(([name]) => name in linked || edges.includes(name)));
 }
 
 /**

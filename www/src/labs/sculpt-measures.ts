@@ -28,7 +28,7 @@ export const SCULPT_ROWS: ExtraMeasure[] = [
     help: text('sculpt.latencyFramesHelp'),
     text: count,
   },
-  { name: 'bands', label: text('sculpt.bands'), help: text('sculpt.bandsHelp'), text: count },
+  { name: 'bands', label: text('sculpt.bands'), help: text('sculpt.bandsHelp'), text: count, optional: true },
   {
     name: 'areaLow',
     label: text('sculpt.areaLow'),
@@ -42,8 +42,8 @@ export const SCULPT_ROWS: ExtraMeasure[] = [
     help: text('sculpt.angleHighHelp'),
     text: figure,
   },
-  { name: 'folded', label: text('sculpt.flipped'), help: text('sculpt.flippedHelp'), text: count },
-  { name: 'missed', label: text('sculpt.missed'), help: text('sculpt.missedHelp'), text: count },
+  { name: 'folded', label: text('sculpt.flipped'), help: text('sculpt.flippedHelp'), text: count, optional: true },
+  { name: 'missed', label: text('sculpt.missed'), help: text('sculpt.missedHelp'), text: count, optional: true },
   {
     name: 'held',
     label: text('sculpt.limited'),

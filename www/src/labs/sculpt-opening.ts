@@ -1,6 +1,6 @@
 import type { SculptClient } from '../sculpt/client';
 import { SCENES, type SculptExample } from '../sculpt/examples';
-import { isSculptPreset, sceneById } from '../sculpt/presets';
+import { poseOf, sceneById } from '../sculpt/presets';
 import type { NamedBytes, OpenedScene, SceneSource, Support } from '../sculpt/protocol';
 import { contentOf } from '../session/recognise';
 import { text } from '../texts';
@@ -87,8 +87,7 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
     if (support === 'membrane' && meshes.detail && !meshes.base)
       this.states.load(text('sculpt.computingBase', { name }));
     const params = { ...(example?.params ?? OWN_PARAMS), ...linked?.params };
-    const [variant] = isSculptPreset(example) ? example.variants : [];
-    const usual = linked?.keys ? undefined : (variant?.pose ?? example?.pose);
+    const usual = linked?.keys ? undefined : poseOf(example);
     const start = example?.start ?? (support === 'surface' ? linked?.rest : undefined);
     const setup = { start, params, pose: linked?.pose ?? usual, support };
     return this.#client.request('open', { source: meshes, setup });

@@ -1,5 +1,5 @@
 import type { SculptClient } from '../sculpt/client';
-import type { FrameEvent, MeasuredEvent, StageKind } from '../sculpt/protocol';
+import type { FrameEvent, MeasuredEvent, StageKind, Support } from '../sculpt/protocol';
 import type { LabState } from '../state';
 import { plural, text } from '../texts';
 import { count } from '../ui/format';
@@ -20,6 +20,7 @@ export class SculptResults {
   #frame: FrameEvent | undefined;
   #shownAt = 0;
   #more: Record<string, unknown> = {};
+  #support: Support = 'membrane';
   /** Whether the undeformed meshes are displayed or were requested. */
   #originals = false;
   /** Counts the scenes opened, so that the worker's replies for a previous scene are discarded. */
@@ -38,6 +39,12 @@ export class SculptResults {
     this.#states = states;
     this.#history = history;
     this.#follow = follow;
+  }
+
+  /** Support of the surface. One that holds itself is no detail on a base: it has no bands, nor does a normal miss it. */
+  set support(support: Support) {
+    if (support !== this.#support) this.#more = {};
+    this.#support = support;
   }
 
   /** Clears all results, for another scene. */
@@ -78,7 +85,8 @@ export class SculptResults {
   /** Displays measures, after the frame they belong to; the state that follows them thus finds both displayed. */
   measured({ measures, facts }: MeasuredEvent): void {
     this.#showPending();
-    Object.assign(this.#more, facts);
+    const { bands, folded, missed, ...others } = facts;
+    Object.assign(this.#more, others, this.#support === 'membrane' && { bands, folded, missed });
     this.#ui.measures.showMeasures(measures);
     this.#ui.measures.showExtra(this.#more);
   }

@@ -29,6 +29,8 @@ export interface Adopted {
   names: string[];
   /** Whether the pose of the ellipsoids was set by hand, rather than by the example, so that links must contain it. */
   posed: boolean;
+  /** Whether the example moves its ellipsoids when it opens, so that links must contain the start pose, too. */
+  opensPosed: boolean;
   film: Film | undefined;
   params: ParamValues;
 }
@@ -51,6 +53,7 @@ export class SculptSettings {
   #names: string[] = [];
   #chosen: number | undefined;
   #posed = false;
+  #opensPosed = false;
   #film: Film | undefined;
   #frame = 0;
   /** Id of the last pose sent to the worker; ids count up. */
@@ -116,13 +119,14 @@ export class SculptSettings {
   }
 
   /** Takes over the settings of a newly opened scene, and clears the undo history. */
-  adopt({ support, start, pose, names, posed, film, params }: Adopted): void {
+  adopt({ support, start, pose, names, posed, opensPosed, film, params }: Adopted): void {
     this.#undo.clear();
     this.#support = support;
     this.#start = start;
     this.#pose = pose;
     this.#names = named(names, pose.length);
     this.#posed = posed;
+    this.#opensPosed = opensPosed;
     this.#film = film;
     this.#frame = 0;
     this.#chosen = undefined;
@@ -282,7 +286,7 @@ export class SculptSettings {
       this.#pose = ready.pose;
       this.#names = named(this.#names, ready.pose.length);
       this.#params = ready.params;
-      this.#posed = false;
+      this.#posed = this.#opensPosed;
       this.#frame = 0;
       await this.#client.request('film', { film: this.#film, frame: 0 });
       this.show();

@@ -1,7 +1,7 @@
 import { SculptClient } from '../sculpt/client';
 import type { SculptExample } from '../sculpt/examples';
 import { lastFrame } from '../sculpt/film';
-import { isSculptPreset, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
+import { isSculptPreset, poseOf, type SculptPreset, type SculptVariant, variantInForce } from '../sculpt/presets';
 import type { FrameContents, FrameEvent, ParamValues, SculptQuantity, Support, WorkerEvent } from '../sculpt/protocol';
 import { contentOf } from '../session/recognise';
 import type { ContentOf } from '../session/schema';
@@ -119,6 +119,7 @@ export class SculptLab extends RunLab<SculptExample> {
       pose,
       names: example?.names ?? [],
       posed: linked?.pose !== undefined,
+      opensPosed: poseOf(example) !== undefined,
       film,
       params,
     });
@@ -179,6 +180,7 @@ export class SculptLab extends RunLab<SculptExample> {
   #showSettings(): void {
     const { params, pose, support } = this.#settings;
     this.ui.showSupport(support);
+    this.#results.support = support;
     const example = this.opening.source?.example;
     const preset = isSculptPreset(example) ? example : undefined;
     this.ui.showParams(params, preset, preset && variantInForce(preset, pose, params, this.#usual));

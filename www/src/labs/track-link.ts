@@ -76,15 +76,13 @@ export function isChosen({ box, at }: Pick<LinkedTrack, 'box' | 'at'> | Setup): 
   return box !== undefined || at !== undefined;
 }
 
-const asText = (values: number[]) => values.map((value) => Number(value.toFixed(3))).join(',');
-
-/** Converts the settings in a link to the hash of an address. */
+/** Converts the settings in a link to the hash of an address, with all digits, which give the same surfaces to the bit. */
 export function toHash({ example, file, params, preparation, box, at, cavity, view }: LinkedTrack): string {
   const query = new URLSearchParams();
   for (const [name, value] of Object.entries({ example, file, ...preparation, ...view }))
     if (value !== undefined) query.set(name, String(value));
-  if (box) query.set('box', box === 'whole' ? box : asText([...box.min, ...box.max]));
-  if (at) query.set('at', at === 'largest' ? at : asText(at));
+  if (box) query.set('box', box === 'whole' ? box : [...box.min, ...box.max].join(','));
+  if (at) query.set('at', at === 'largest' ? at : at.join(','));
   if (cavity) query.set('cavity', cavity);
   for (const [name, value] of Object.entries(params)) query.set(`p.${name}`, String(value));
   const text = query.toString().replaceAll('%2C', ',');

@@ -268,6 +268,12 @@ export function isSculptPreset(example: SculptExample | undefined): example is S
   return example !== undefined && 'variants' in example;
 }
 
+/** Returns the pose that the ellipsoids of an example move to when it opens, undefined if they stay. */
+export function poseOf(example: SculptExample | undefined): Pose | undefined {
+  const [variant] = isSculptPreset(example) ? example.variants : [];
+  return variant?.pose ?? example?.pose;
+}
+
 /**
  * Returns the poses in an example's keyframes and variants, so that the view can leave room for them; poses of computed
  * films are not included.

@@ -7,6 +7,10 @@ import { type PlotAxis, type PlotMark, plotSvg } from './plot-svg';
 
 /** Height of the tick marks of one kind of event, CSS pixels. */
 const MARK_LANE = 6;
+/** Least width of a vertical axis, space beside its labels, and width of a digit in them, CSS pixels. */
+const LEAST_AXIS = 40;
+const LABEL_GAP = 14;
+const DIGIT = 6.5;
 const NUMBERS = new Intl.NumberFormat(LANGUAGE);
 
 /** A curve of a plot; colours of plots are names of style tokens. */
@@ -140,6 +144,12 @@ export class LinePlot {
       hooks: { drawClear: [(plot) => drawMarks(plot, marks?.() ?? [])] },
     };
   }
+}
+
+/** Returns the width of a vertical axis in which its labels have room, CSS pixels. */
+export function roomFor(labels: readonly string[] | null): number {
+  const longest = Math.max(0, ...(labels ?? []).map((label) => label.length));
+  return Math.max(LEAST_AXIS, LABEL_GAP + DIGIT * longest);
 }
 
 function seriesFor({ label, color, dash, dots = false }: PlotLine): uPlot.Series {

@@ -46,6 +46,14 @@ export interface StartChoice {
   box?: number | undefined;
 }
 
+/** The choice for a volume for which no other was made. */
+export const USUAL_START: StartChoice = {
+  kind: 'contour',
+  bubbles: DEFAULT_BUBBLES,
+  levels: DEFAULT_LEVELS,
+  edge: undefined,
+};
+
 /**
  * Controls of the Extract lab for the initial surface. A change restarts the model; if it is rejected, the previous
  * values are restored.

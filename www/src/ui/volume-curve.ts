@@ -2,7 +2,7 @@ import { plural, text } from '../texts';
 import { type Beat, beatOf } from '../track/curve';
 import { h } from './dom';
 import { figure } from './format';
-import { LinePlot, type PlotLine } from './line-plot';
+import { LinePlot, type PlotLine, roomFor } from './line-plot';
 import type { PlotMark } from './plot-svg';
 import { legendOf } from './plots';
 
@@ -48,7 +48,7 @@ export class VolumeCurve {
       x: { range: (_, low, high) => [(low ?? 1) - 0.5, (high ?? 2) + 0.5] },
       y: { range: (_, low, high) => (low === null || high === null ? [0, 1] : spread(low, high)) },
       xAxis: { incrs: [1, 2, 5, 10, 20, 50, 100] },
-      yAxis: { size: 40 },
+      yAxis: { size: (_, labels) => roomFor(labels) },
       marks: () => this.#marks(),
       below: [this.#legend, this.#caption],
     });
