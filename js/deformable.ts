@@ -326,8 +326,8 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * Runs to the end, yielding to the event loop between slices of work, also within a step. Parameters and attractors may
-   * be changed meanwhile; like all that looks at the model, that ends a step that is under way first.
+   * Runs to the end, yielding to the event loop between slices of work. Parameters and attractors may be changed
+   * meanwhile.
    *
    * @returns The last report.
    * @throws `signal.reason` when aborted, and the model stays usable; any error thrown by `onStep` or `onData`;
@@ -338,22 +338,13 @@ export class DeformableModel implements Stepper {
   async run(given?: DeformableRunOptions): Promise<StepReport> {
     const { onData, ...run } = checkProperties<DeformableRunOptions>('options', given, RUN_OPTIONS);
     checkListener('onData', onData);
-    return this.#runner.run(() => this.#advance(), run, onData);
-  }
-
-  /** Does a slice of a step; returns its report at its end. */
-  #advance(): StepReport | undefined {
-    const outcome = this.#handle.use((raw) => raw.advance() as StepOutcome | undefined);
-    return outcome && this.#taken(outcome);
+    return this.#runner.run(() => this.#step(1), run, onData);
   }
 
   #step(iterations: number): StepReport {
-    return this.#taken(this.#handle.use((raw) => raw.step(iterations) as StepOutcome));
-  }
-
-  #taken(outcome: StepOutcome): StepReport {
-    if (!('needs' in outcome)) return this.#warnings.take(outcome);
-    throw new NeedsDataError((options) => this.#load(outcome.needs, options));
+    const report = this.#handle.use((raw) => raw.step(iterations) as StepReport | { needs: SparseBox[] });
+    if (!('needs' in report)) return this.#warnings.take(report);
+    throw new NeedsDataError((options) => this.#load(report.needs, options));
   }
 
   async #load(needs: SparseBox[], options: DataOptions | undefined): Promise<void> {
@@ -488,9 +479,6 @@ interface SparseParts {
 }
 
 type Options = Partial<DeformableOptions>;
-
-/** The report of a step, or the data that it needs. */
-type StepOutcome = StepReport | { needs: SparseBox[] };
 
 /** Arguments that {@link DeformableModel.create} passes to the constructor. */
 class Created {

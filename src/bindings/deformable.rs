@@ -1,6 +1,8 @@
 //! Bindings of the deformable model.
 
 use std::cell::RefCell;
+use std::future::Future;
+use std::pin::Pin;
 use std::rc::Rc;
 use std::task::Poll;
 
@@ -11,14 +13,13 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::{doubles, to_js, with_overrides, world_points};
 use super::error::Failure;
 use super::mesh::RawMesh;
-use super::method::{self, method_bindings};
-use super::slices::{Computation, InSlices, LiveInSlices, StepsInSlices};
+use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
 use vesicle::math::DVec3;
+use vesicle::methods::MethodError;
 use vesicle::methods::deformable::{
     Attractor, Coverage, CoverageSurvey, DeformableModel, DeformableOptions, DeformableParams, Missing, Start,
 };
-use vesicle::methods::{MethodError, StepReport};
 use vesicle::pauses::advance;
 
 /// The raw handle of a start surface, from which a deformable model begins.
@@ -64,28 +65,11 @@ impl RawStart {
 
 /// The raw handle of the TypeScript class `DeformableModel`, which shares the model with the live mesh of its surface.
 #[wasm_bindgen]
-pub struct RawDeformable(Rc<RefCell<InSlices<DeformableModel>>>);
-
-impl StepsInSlices for DeformableModel {
-    async fn step_in_slices(&mut self) -> Result<StepReport, MethodError> {
-        DeformableModel::step_in_slices(self).await
-    }
-}
-
-impl RawDeformable {
-    pub(super) fn of(model: DeformableModel) -> Self {
-        Self(InSlices::shared(model))
-    }
-
-    /// Returns the model, after the step that is under way.
-    pub(super) fn model(&self) -> Rc<RefCell<DeformableModel>> {
-        self.0.borrow_mut().ready_model()
-    }
-}
+pub struct RawDeformable(pub(super) Rc<RefCell<DeformableModel>>);
 
 /// A model that is being created in slices.
 #[wasm_bindgen]
-pub struct RawDeformableCreation(Computation<Result<DeformableModel, MethodError>>);
+pub struct RawDeformableCreation(Pin<Box<dyn Future<Output = Result<DeformableModel, MethodError>>>>);
 
 #[wasm_bindgen]
 impl RawDeformableCreation {
@@ -109,7 +93,7 @@ impl RawDeformableCreation {
     pub fn advance(&mut self) -> Result<Option<RawDeformable>, JsValue> {
         match advance(&mut self.0) {
             Poll::Pending => Ok(None),
-            Poll::Ready(model) => Ok(Some(RawDeformable::of(model.map_err(Failure::from)?))),
+            Poll::Ready(model) => Ok(Some(RawDeformable(shared(model)?))),
         }
     }
 }
@@ -132,7 +116,7 @@ impl RawDeformable {
     ) -> Result<RawDeformable, JsValue> {
         let params = with_overrides(&DeformableParams::for_volume(&volume.0), params)?;
         let options = DeformableOptions { frame, start: start.0, levels, edge, params: Some(params) };
-        Ok(Self::of(DeformableModel::new(&volume.0, options).map_err(Failure::from)?))
+        Ok(RawDeformable(shared(DeformableModel::new(&volume.0, options))?))
     }
 
     /// Returns the largest number of pyramid levels above a volume.
@@ -143,19 +127,13 @@ impl RawDeformable {
 
     /// Returns the surface as a live mesh, which changes with the model.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh::live(&Rc::new(RefCell::new(LiveInSlices(Rc::clone(&self.0)))))
-    }
-
-    /// Does a slice of a step; returns its `StepReport` at its end, or an object with the boxes it `needs`, else undefined.
-    pub fn advance(&self) -> Result<JsValue, JsValue> {
-        let ended = self.0.borrow_mut().advance();
-        Ok(ended.map_or(Ok(JsValue::UNDEFINED), method::outcome)?)
+        RawMesh::live(&self.0)
     }
 
     /// Adds the parts of the iso-surface at π_I of the current pyramid level that the model's surface lacks, unless its
     /// topology is fixed; returns a `StepReport` that counts them as `seeds`.
     pub fn seed(&self) -> Result<JsValue, JsValue> {
-        let report = self.model().borrow_mut().seed().map_err(Failure::from)?;
+        let report = self.0.borrow_mut().seed().map_err(Failure::from)?;
         Ok(to_js(&report)?)
     }
 
@@ -163,7 +141,7 @@ impl RawDeformable {
     /// other; see [`Coverage`].
     #[wasm_bindgen(js_name = surveyCoverage)]
     pub fn survey_coverage(&self) -> Result<RawCoverageSurvey, JsValue> {
-        let survey = self.model().borrow().survey_coverage().map_err(Failure::from)?;
+        let survey = self.0.borrow().survey_coverage().map_err(Failure::from)?;
         Ok(RawCoverageSurvey(Some(survey)))
     }
 
@@ -178,25 +156,25 @@ impl RawDeformable {
             strength,
             radius,
         });
-        self.model().borrow_mut().set_attractors(list.collect()).map_err(Failure::from)?;
+        self.0.borrow_mut().set_attractors(list.collect()).map_err(Failure::from)?;
         Ok(())
     }
 
     /// Returns the index of the current pyramid level; 0 is the volume itself, higher ones are coarser.
     pub fn level(&self) -> usize {
-        self.model().borrow().level()
+        self.0.borrow().level()
     }
 
     /// Returns the lower bound of edge lengths on the current pyramid level, δ, in world units, averaged over
     /// directions if voxels are not cubes.
     pub fn delta(&self) -> f64 {
-        self.model().borrow().delta()
+        self.0.borrow().delta()
     }
 
     /// Returns the speed of each vertex along its outward normal, negative inwards, in world units per unit of time and
     /// in the order of the mesh's arrays.
     pub fn speeds(&self) -> Vec<f32> {
-        self.model().borrow().speeds()
+        self.0.borrow().speeds()
     }
 }
 

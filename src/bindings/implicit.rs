@@ -51,12 +51,6 @@ impl RawCameras {
 #[wasm_bindgen]
 pub struct RawImplicit(Rc<RefCell<ImplicitSurface>>);
 
-impl RawImplicit {
-    fn model(&self) -> &RefCell<ImplicitSurface> {
-        &self.0
-    }
-}
-
 method_bindings!(RawImplicit, ImplicitSurface, implicitParamSpecs);
 
 #[wasm_bindgen]

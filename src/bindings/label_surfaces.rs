@@ -1,32 +1,80 @@
 //! Bindings of the surfaces of a label map.
 
 use std::cell::RefCell;
+use std::future::Future;
+use std::pin::Pin;
 use std::rc::Rc;
 use std::task::Poll;
 
 use js_sys::Uint8Array;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, to_js, with_overrides};
+use super::convert::{bytes, now, to_js, with_overrides};
 use super::error::Failure;
 use super::labels::region;
 use super::mesh::RawMesh;
 use super::method;
-use super::slices::{Computation, InSlices, StepsInSlices};
 use super::volume::RawVolume;
 use vesicle::math::DVec3;
 use vesicle::mesh::TriangleMesh;
 use vesicle::methods::label_surfaces::{LabelParams, LabelSurfaces};
 use vesicle::methods::{LiveSurface, Method, MethodError, StepReport};
-use vesicle::pauses::advance;
+use vesicle::pauses::{advance, finished};
 
-impl StepsInSlices for LabelSurfaces {
-    async fn step_in_slices(&mut self) -> Result<StepReport, MethodError> {
-        LabelSurfaces::step_in_slices(self).await
+type Computation<T> = Pin<Box<dyn Future<Output = T>>>;
+type Stepped = (LabelSurfaces, Result<StepReport, MethodError>);
+
+/// Surfaces, of which a step may be under way: whatever is asked of them then ends it first, so that a step changes all or
+/// nothing for those who look.
+enum Surfaces {
+    Ready(Box<LabelSurfaces>),
+    Stepping(Computation<Stepped>),
+    /// While they are moved from one state to another.
+    Moved,
+}
+
+impl Surfaces {
+    fn new(mut surfaces: LabelSurfaces) -> Self {
+        surfaces.set_clock(now);
+        Self::Ready(Box::new(surfaces))
+    }
+
+    /// Returns the surfaces, after the step that is under way.
+    fn ready(&mut self) -> &mut LabelSurfaces {
+        *self = match std::mem::replace(self, Self::Moved) {
+            Self::Stepping(step) => Self::Ready(Box::new(finished(step).0)),
+            ready => ready,
+        };
+        match self {
+            Self::Ready(surfaces) => surfaces,
+            _ => unreachable!("surfaces are moved back at once"),
+        }
+    }
+
+    /// Does a slice of the step that is under way, or begins one; returns its report at its end.
+    fn advance(&mut self) -> Option<Result<StepReport, MethodError>> {
+        let mut step = match std::mem::replace(self, Self::Moved) {
+            Self::Stepping(step) => step,
+            Self::Ready(surfaces) => Box::pin(stepped(*surfaces)),
+            Self::Moved => unreachable!("surfaces are moved back at once"),
+        };
+        match advance(&mut step) {
+            Poll::Pending => {
+                *self = Self::Stepping(step);
+                None
+            }
+            Poll::Ready((surfaces, report)) => {
+                *self = Self::Ready(Box::new(surfaces));
+                Some(report)
+            }
+        }
     }
 }
 
-type Surfaces = InSlices<LabelSurfaces>;
+async fn stepped(mut surfaces: LabelSurfaces) -> Stepped {
+    let report = surfaces.step_in_slices().await;
+    (surfaces, report)
+}
 
 /// Surfaces of a label map that are being created in slices.
 #[wasm_bindgen]
@@ -61,7 +109,7 @@ pub struct RawLabelSurfaces(Rc<RefCell<Surfaces>>);
 
 impl RawLabelSurfaces {
     fn of(surfaces: LabelSurfaces) -> Self {
-        Self(Surfaces::shared(surfaces))
+        Self(Rc::new(RefCell::new(Surfaces::new(surfaces))))
     }
 }
 
@@ -119,7 +167,7 @@ impl RawLabelSurfaces {
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
         let mut surfaces = self.0.borrow_mut();
-        let mut surfaces = surfaces.ready();
+        let surfaces = surfaces.ready();
         let params = with_overrides(surfaces.params(), params)?;
         Ok(surfaces.set_params(params).map_err(Failure::from)?)
     }

@@ -8,7 +8,7 @@ use wasm_bindgen::prelude::JsValue;
 
 use super::convert::{bytes, now, to_js, with_overrides};
 use super::error::Failure;
-use vesicle::methods::{Method, MethodError, Parameters, StepReport};
+use vesicle::methods::{Method, MethodError, Parameters};
 
 /// Returns a new model with a clock for its reports, shared between its raw handle and the live meshes of its surfaces.
 pub fn shared<M: Method>(model: Result<M, MethodError>) -> Result<Rc<RefCell<M>>, Failure> {
@@ -19,12 +19,7 @@ pub fn shared<M: Method>(model: Result<M, MethodError>) -> Result<Rc<RefCell<M>>
 
 /// Makes `iterations` steps; returns the `StepReport`. See `step` of [`method_bindings!`], as for the functions below.
 pub fn step(model: &RefCell<impl Method>, iterations: u32) -> Result<JsValue, Failure> {
-    outcome(model.borrow_mut().steps(iterations))
-}
-
-/// Returns the report of a step, or the boxes that it needs.
-pub fn outcome(report: Result<StepReport, MethodError>) -> Result<JsValue, Failure> {
-    match report {
+    match model.borrow_mut().steps(iterations) {
         #[cfg(all(feature = "sparse", feature = "deformable"))]
         Err(MethodError::NeedsData { needs }) => super::sparse::needs(&needs),
         report => to_js(&report?),
@@ -53,7 +48,7 @@ pub fn param_specs<M: Method>() -> Result<JsValue, Failure> {
     to_js(&M::Params::specs())
 }
 
-/// Exports what all methods have: functions of the raw handle `$Raw`, whose `model()` is a shared `$Model`, and the function
+/// Exports what all methods have: functions of the raw handle `$Raw`, which holds a shared `$Model`, and the function
 /// that JavaScript knows as `$specs`, which describes the parameters.
 macro_rules! method_bindings {
     ($Raw:ident, $Model:ident, $specs:ident) => {
@@ -63,31 +58,31 @@ macro_rules! method_bindings {
             /// step, with the events of all these steps. If bricks of a sparse volume are missing for the first one, nothing
             /// changes, and an object with the boxes it `needs` is returned.
             pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
-                Ok($crate::method::step(&self.model(), iterations)?)
+                Ok($crate::method::step(&self.0, iterations)?)
             }
 
             /// Returns the current values of all parameters of the model, as a plain object.
             pub fn params(&self) -> Result<JsValue, JsValue> {
-                Ok($crate::method::params(&self.model())?)
+                Ok($crate::method::params(&self.0)?)
             }
 
             /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are
             /// validated together before any is changed.
             #[wasm_bindgen(js_name = setParams)]
             pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
-                Ok($crate::method::set_params(&self.model(), params)?)
+                Ok($crate::method::set_params(&self.0, params)?)
             }
 
             /// Returns the state of the run as bytes, without the input that the model was made of, from which
             /// `restore` continues it.
             pub fn save(&self) -> Vec<u8> {
-                self.model().borrow().save()
+                self.0.borrow().save()
             }
 
             /// Replaces the run by one that `save` returned, if this model was made of the same input, else fails; the
             /// run then continues with the same results, bit for bit.
             pub fn restore(&self, state: &js_sys::Uint8Array) -> Result<(), JsValue> {
-                Ok($crate::method::restore(&self.model(), state)?)
+                Ok($crate::method::restore(&self.0, state)?)
             }
         }
 

@@ -55,8 +55,6 @@ mod method;
 mod multires;
 #[cfg(feature = "import")]
 mod readers;
-#[cfg(any(feature = "deformable", feature = "labels", feature = "tracking"))]
-mod slices;
 #[cfg(all(feature = "sparse", feature = "deformable"))]
 mod sparse;
 mod texture;

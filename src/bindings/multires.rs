@@ -23,12 +23,6 @@ use vesicle::methods::multires::{
 #[wasm_bindgen]
 pub struct RawMultires(Rc<RefCell<MultiresolutionModel>>);
 
-impl RawMultires {
-    fn model(&self) -> &RefCell<MultiresolutionModel> {
-        &self.0
-    }
-}
-
 method_bindings!(RawMultires, MultiresolutionModel, multiresParamSpecs);
 
 /// A surface of a multiresolution model besides the detailed one, as the content of a live mesh: the deformed base, or the

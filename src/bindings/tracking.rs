@@ -1,6 +1,8 @@
 //! Bindings of the surface tracker.
 
-use std::cell::RefCell;
+use std::cell::{RefCell, RefMut};
+use std::future::Future;
+use std::pin::Pin;
 use std::rc::Rc;
 use std::task::Poll;
 
@@ -8,24 +10,98 @@ use js_sys::{Float64Array, Uint8Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, doubles, to_js, with_overrides, write_options};
+use super::convert::{bytes, doubles, now, to_js, with_overrides, write_options};
 use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method;
-use super::slices::{Computation, InSlices, LiveInSlices, StepsInSlices};
 use super::volume::RawVolume;
 use vesicle::io::AnimationWriter;
 use vesicle::math::DVec3;
+use vesicle::mesh::TriangleMesh;
 use vesicle::methods::tracking::{
     Bounds, Cavity, Component, FrameStatistics, Proposal, Query, SurfaceTracker, TrackingOptions,
     TrackingParams,
 };
-use vesicle::methods::{Method, MethodError, StepReport};
-use vesicle::pauses::advance;
+use vesicle::methods::{LiveSurface, Method, MethodError, StepReport};
+use vesicle::pauses::{advance, finished};
 
-impl StepsInSlices for SurfaceTracker {
-    async fn step_in_slices(&mut self) -> Result<StepReport, MethodError> {
-        SurfaceTracker::step_in_slices(self).await
+type Computation<T> = Pin<Box<dyn Future<Output = T>>>;
+
+/// A tracker, of which a step may be under way: whatever is asked of it then ends it first, so that a step changes all or
+/// nothing for those who look.
+struct Tracking {
+    tracker: Rc<RefCell<SurfaceTracker>>,
+    /// The step under way, which borrows the tracker until it ends or is dropped.
+    step: Option<Computation<Result<StepReport, MethodError>>>,
+    /// The report of a step that was ended by whoever asked for something, until a run takes it.
+    ended: Option<Result<StepReport, MethodError>>,
+}
+
+impl Tracking {
+    fn new(mut tracker: SurfaceTracker) -> Self {
+        tracker.set_clock(now);
+        Self { tracker: Rc::new(RefCell::new(tracker)), step: None, ended: None }
+    }
+
+    /// Returns the tracker, after the step that is under way.
+    fn ready(&mut self) -> RefMut<'_, SurfaceTracker> {
+        if let Some(step) = self.step.take() {
+            self.ended = Some(finished(step));
+        }
+        self.tracker.borrow_mut()
+    }
+
+    /// Does a slice of the step that is under way, or begins one; returns its report at its end, or that of one that has ended
+    /// since the last slice.
+    fn advance(&mut self) -> Option<Result<StepReport, MethodError>> {
+        if let Some(report) = self.ended.take() {
+            return Some(report);
+        }
+        let mut step = self.step.take().unwrap_or_else(|| Box::pin(stepped(Rc::clone(&self.tracker))));
+        match advance(&mut step) {
+            Poll::Pending => {
+                self.step = Some(step);
+                None
+            }
+            Poll::Ready(report) => Some(report),
+        }
+    }
+
+    /// Ends the step that is under way without its result.
+    fn discard(&mut self) {
+        self.ended = None;
+        if self.step.take().is_some() {
+            self.tracker.borrow_mut().discard_step();
+        }
+    }
+}
+
+#[allow(
+    clippy::await_holding_refcell_ref,
+    reason = "whoever else wants the tracker ends or drops the step first"
+)]
+async fn stepped(tracker: Rc<RefCell<SurfaceTracker>>) -> Result<StepReport, MethodError> {
+    tracker.borrow_mut().step_in_slices().await
+}
+
+/// The surface of a tracker in the newest frame.
+struct LiveTracking(Rc<RefCell<Tracking>>);
+
+impl LiveSurface for LiveTracking {
+    fn surface(&self) -> TriangleMesh {
+        self.0.borrow_mut().ready().surface()
+    }
+
+    fn origin(&self) -> DVec3 {
+        LiveSurface::origin(&*self.0.borrow_mut().ready())
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        self.0.borrow_mut().ready().counts()
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        self.0.borrow_mut().ready().versions()
     }
 }
 
@@ -105,7 +181,7 @@ impl From<Proposal> for ProposalCopy {
 
 /// The raw handle of the TypeScript class `SurfaceTracker`, which shares the tracker with the live mesh of its surface.
 #[wasm_bindgen]
-pub struct RawTracker(Rc<RefCell<InSlices<SurfaceTracker>>>);
+pub struct RawTracker(Rc<RefCell<Tracking>>);
 
 #[wasm_bindgen]
 impl RawTracker {
@@ -137,7 +213,7 @@ impl RawTracker {
             params: with_overrides(&TrackingParams::default(), params)?,
         };
         let tracker = SurfaceTracker::new(options).map_err(Failure::from)?;
-        Ok(RawTracker(InSlices::shared(tracker)))
+        Ok(RawTracker(Rc::new(RefCell::new(Tracking::new(tracker)))))
     }
 
     /// Makes `iterations` steps, or fewer if the tracker is done before; returns the `StepReport` of the last step, with the
@@ -155,9 +231,7 @@ impl RawTracker {
 
     /// Ends the step that is under way without its result.
     pub fn discard(&self) {
-        if let Some(mut tracker) = self.0.borrow_mut().drop_step() {
-            tracker.discard_step();
-        }
+        self.0.borrow_mut().discard();
     }
 
     /// Returns the current values of all parameters, as a plain object.
@@ -191,7 +265,7 @@ impl RawTracker {
     /// Returns a live mesh of the surface in the newest finished frame; before the first one is finished, of the start
     /// surface if there is one, else empty.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh::live(&Rc::new(RefCell::new(LiveInSlices(Rc::clone(&self.0)))))
+        RawMesh::live(&Rc::new(RefCell::new(LiveTracking(Rc::clone(&self.0)))))
     }
 
     /// Returns the surface of a finished frame; undefined for other frames.

@@ -598,21 +598,3 @@ test('a model can be created in slices, with the same bits, and not if that is a
   const error = await rejection(DeformableModel.create({ volume, edge: -1 }));
   expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining('edge')]);
 });
-
-test('a run that is aborted within a step leaves a model in which nothing is half done', async () => {
-  const volume = noise(24);
-  const [whole, sliced] = [new DeformableModel({ volume }), new DeformableModel({ volume })];
-  const stop = new AbortController();
-  setTimeout(() => stop.abort(new Error('enough')));
-  let steps = 0;
-  const onStep = () => {
-    steps++;
-  };
-  await expect(sliced.run({ signal: stop.signal, budgetMs: 0.1, onStep })).rejects.toThrow('enough');
-  // A step that was under way ends when someone looks.
-  expect(sliced.mesh.check()).toMatchObject({ closed: true, oriented: true, selfIntersections: 0 });
-  const at = (await sliced.run({ maxIterations: 1 })).iteration;
-  expect(at).toBeGreaterThan(steps);
-  expect(whole.step(at).iteration).toBe(at);
-  expect(sliced.save()).toEqual(whole.save());
-});

@@ -183,8 +183,7 @@ class Labs {
     for (const [one, link] of this.#links) {
       if (one === id) {
         link.setAttribute('aria-current', 'page');
-        // On a narrow page the links scroll.
-        link.scrollIntoView({ block: 'nearest', inline: 'center' });
+        centreInBar(link);
       } else link.removeAttribute('aria-current');
     }
     const title = document.getElementById('lab-name');
@@ -193,6 +192,17 @@ class Labs {
     if (summary) summary.textContent = tagline;
     document.getElementById('guide')?.setAttribute('href', guide);
   }
+}
+
+/**
+ * Scrolls the bar of the labs, which is narrow on phones, to the middle of a link. After `scrollIntoView`, Tab would begin
+ * behind the link.
+ */
+function centreInBar(link: HTMLElement): void {
+  const bar = link.closest('.labs');
+  if (!bar) return;
+  const [whole, part] = [bar.getBoundingClientRect(), link.getBoundingClientRect()];
+  bar.scrollLeft += (part.left + part.right - whole.left - whole.right) / 2;
 }
 
 /** Offers the lessons: a button shows and hides their panel, whose code is fetched when it is first needed. */
