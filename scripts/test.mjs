@@ -129,7 +129,7 @@ const GROUPS = [
       ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 20],
       ['app build', works(buildApp), 25],
       ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')]), 15],
-      ['app', vitest('tests/app', '--project=together', SHORT), 350],
+      ['app', vitest('tests/app', '--project=together', SHORT), 450],
     ],
   ],
   [[['app alone', vitest('tests/app', '--project=alone', SHORT), 100]]],

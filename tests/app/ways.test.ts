@@ -13,6 +13,7 @@ import { uniform } from '../../www/src/random';
 import { computedCloud } from '../../www/src/reconstruct/clouds';
 import { cineVoxels } from '../../www/src/track/cine';
 import { type App, drop, openApp, reach, unfold } from './browser';
+import { LONG } from './long';
 import { pickFrom, programsIn } from './run-code';
 
 const RUNS = process.env.PROPERTY_RUNS;
@@ -477,28 +478,28 @@ function shuffled<T>(list: T[], random: Random): T[] {
 
 const programs = await programsIn('ways');
 
-/** Those that run for every change. */
-const QUICK = ['Extract, a file', 'Reconstruct, an example', 'Track, a file', 'Sculpt, an example'];
-const ALL = Object.entries(CASES);
+/** Those that run for every change; the others are long. */
+const QUICK = ['Extract, a file', 'Sculpt, an example'];
 
-describe.each(RUNS === undefined ? ALL.filter(([name]) => QUICK.includes(name)) : ALL)('%s', (name, one) => {
-  test.each(SEEDS)('all ways lead to one surface, with seed %i', async (seed) => {
-    const random = uniform(100 * seed + Object.keys(CASES).indexOf(name));
-    const walk = new Walk(app.page, one, random);
-    await walk.begin();
-    const [expected, hash] = [await surface(app.page), await hashOf(app.page)];
-    const path: string[] = [];
-    for (const [way, go] of shuffled(Object.entries(walk.ways), random).slice(0, WAYS)) {
-      path.push(way);
-      await go();
-      const what = `seed ${seed}: ${path.join(', ')}`;
-      expect(await hashOf(app.page), what).toBe(hash);
-      expectSame(await surface(app.page), expected, walk.tolerance, what);
-    }
-    const last = await surface(app.page);
-    await programs.add(seed, await codeOf(app.page));
-    const given = walk.file ?? { name: 'data', bytes: new Uint8Array(await dataOf(app.page)) };
-    // The code has no map on the globe, whose texture coordinates it rounds otherwise.
-    await programs.expectSame([last], [given], one.example === 'globe' ? shapeOf : undefined);
+for (const [name, one] of Object.entries(CASES))
+  describe(name, QUICK.includes(name) ? {} : LONG, () => {
+    test.each(SEEDS)('all ways lead to one surface, with seed %i', async (seed) => {
+      const random = uniform(100 * seed + Object.keys(CASES).indexOf(name));
+      const walk = new Walk(app.page, one, random);
+      await walk.begin();
+      const [expected, hash] = [await surface(app.page), await hashOf(app.page)];
+      const path: string[] = [];
+      for (const [way, go] of shuffled(Object.entries(walk.ways), random).slice(0, WAYS)) {
+        path.push(way);
+        await go();
+        const what = `seed ${seed}: ${path.join(', ')}`;
+        expect(await hashOf(app.page), what).toBe(hash);
+        expectSame(await surface(app.page), expected, walk.tolerance, what);
+      }
+      const last = await surface(app.page);
+      await programs.add(seed, await codeOf(app.page));
+      const given = walk.file ?? { name: 'data', bytes: new Uint8Array(await dataOf(app.page)) };
+      // The code has no map on the globe, whose texture coordinates it rounds otherwise.
+      await programs.expectSame([last], [given], one.example === 'globe' ? shapeOf : undefined);
+    });
   });
-});
