@@ -1,7 +1,7 @@
 // A beating ventricle with papillary muscles, as in cine MR, of the paper's size. The same as in the core's tests
 // (`tests/common/cine.rs`), except for the random numbers of its noise.
 import { Volume } from '../pkg/index.js';
-import { randomNumbers } from './random.mjs';
+import { randomNumbers, ricianByte } from './random.mjs';
 
 const DIMS = [156, 192, 25];
 const SPACING = [1.67, 1.67, 5];
@@ -86,12 +86,6 @@ function clean({ cavity, heart }, x, y, z) {
   return sum / LAYERS;
 }
 
-/** Adds Rician noise, as in MR magnitude images. */
-function noisy(value, random) {
-  const [length, angle] = [NOISE * Math.sqrt(-2 * Math.log(random())), 2 * Math.PI * random()];
-  return clamp(Math.round(Math.hypot(value + length * Math.cos(angle), length * Math.sin(angle))), 0, 255);
-}
-
 /** Returns the volume with all frames and noise. */
 export function cine() {
   const random = randomNumbers(17);
@@ -102,7 +96,7 @@ export function cine() {
     for (let i = 0; i < nx * ny * nz; i++, at++) {
       const place = [i % nx, Math.floor(i / nx) % ny, Math.floor(i / (nx * ny))];
       const [x, y, z] = place.map((n, k) => n * SPACING[k] - MIDDLE[k]);
-      data[at] = noisy(clean(there, x, y, z), random);
+      data[at] = ricianByte(clean(there, x, y, z), NOISE, random);
     }
   }
   return new Volume({ data, dims: [...DIMS, FRAMES], spacing: SPACING, frameSeconds: FRAME_SECONDS });

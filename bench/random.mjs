@@ -13,3 +13,21 @@ export function randomNumbers(seed) {
     return ((mixed ^ (mixed >>> 14)) >>> 0) / 2 ** 32 + 2 ** -33;
   };
 }
+
+/**
+ * Returns a number of the standard normal distribution (Box and Muller).
+ * @param {() => number} random
+ */
+export const normalNumber = (random) => Math.sqrt(-2 * Math.log(random())) * Math.cos(2 * Math.PI * random());
+
+/**
+ * Returns an intensity with Rician noise, as in MR magnitude images, as a byte.
+ * @param {number} value
+ * @param {number} noise
+ * @param {() => number} random
+ */
+export function ricianByte(value, noise, random) {
+  const [length, angle] = [noise * Math.sqrt(-2 * Math.log(random())), 2 * Math.PI * random()];
+  const magnitude = Math.hypot(value + length * Math.cos(angle), length * Math.sin(angle));
+  return Math.min(Math.max(Math.round(magnitude), 0), 255);
+}

@@ -1,6 +1,6 @@
 // Files beside one that may refer to them: the voxels of a header, the buffers of a document.
 import { readdir, readFile, stat } from 'node:fs/promises';
-import { basename, dirname, join } from 'node:path';
+import { basename, dirname, join, relative } from 'node:path';
 
 /** Most bytes of all files beside one. */
 const MOST_BYTES = 2 ** 28;
@@ -24,4 +24,20 @@ export async function filesBelow(folder, names) {
   const entries = await readdir(folder, { recursive: true, withFileTypes: true });
   const files = entries.filter((entry) => entry.isFile() && names.test(entry.name));
   return files.map((entry) => join(entry.parentPath, entry.name)).sort();
+}
+
+/**
+ * Reads the files in a folder whose names match, but for those that belong to others: gives on what `read` finds in each, and a
+ * `failure` for one that cannot be read.
+ */
+export async function* readEach(folder, names, belonging, read) {
+  const all = await filesBelow(folder, names);
+  for (const path of all.filter((one) => !belonging.test(one))) {
+    const name = relative(folder, path) || basename(path);
+    try {
+      yield* read(path, name, all);
+    } catch (failure) {
+      yield { name, failure };
+    }
+  }
 }

@@ -1,8 +1,8 @@
 // Three computed sequences with known surfaces for `npm run real -- --sequences`, on which no setting of the package was chosen: a heart in a tilted view,
 // a breathing balloon and a growing cell. Each frame has a function for the object that is negative inside, and one for the intensity.
-import { randomNumbers } from '../bench/random.mjs';
+import { randomNumbers, ricianByte } from '../bench/random.mjs';
 
-const { abs, atan2, cos, exp, hypot, max, min, PI, sin, sqrt } = Math;
+const { abs, atan2, cos, exp, hypot, max, min, PI, sin } = Math;
 
 /** Number of layers over the thickness of a slice whose intensities are averaged. */
 const LAYERS = 4;
@@ -128,8 +128,7 @@ export function imageOf({ Volume }, made) {
     for (let layer = 0; layer < LAYERS; layer++) {
       sum += shade(x, y, z + spacing[2] * ((layer + 0.5) / LAYERS - 0.5), spacing[0]);
     }
-    const [length, angle] = [noise * sqrt(-2 * Math.log(random())), 2 * PI * random()];
-    data[i] = clamp(Math.round(hypot(sum / LAYERS + length * cos(angle), length * sin(angle))), 0, 255);
+    data[i] = ricianByte(sum / LAYERS, noise, random);
   }
   return new Volume({ data, dims: [...dims, frames], spacing, origin, frameSeconds: 0.05, unit: 'mm' });
 }

@@ -1,6 +1,7 @@
 // Takes the pictures of the README and the docs from the running app, of labs whose examples are done: `npm run pictures`. The
 // controls in each are kept in docs/pictures.json; a test of the app fails when the app has other ones, and pictures are outdated.
 import { mkdir, readFile, writeFile } from 'node:fs/promises';
+import { normalNumber, randomNumbers } from '../bench/random.mjs';
 import { launchChromium } from './chromium.mjs';
 import { serveApp } from './serve.mjs';
 import { at, say, script, startedAs } from './shell.mjs';
@@ -91,17 +92,14 @@ async function plate() {
 
 /** Returns points on both sides of a bowl whose wall is five times as thick as their noise. */
 async function bowl() {
-  let seed = 7;
-  const random = () => {
-    seed = (seed * 1664525 + 1013904223) >>> 0;
-    return seed / 2 ** 32;
-  };
-  const normal = () => Math.sqrt(-2 * Math.log(1 - random())) * Math.cos(2 * Math.PI * random());
+  const random = randomNumbers(7);
   const point = (_, index) => {
     const [height, turn] = [-random(), 2 * Math.PI * random()];
     const flat = Math.sqrt(1 - height ** 2);
     const radius = index % 2 === 0 ? 1 : 0.9;
-    return [flat * Math.cos(turn), flat * Math.sin(turn), height].map((x) => radius * x + 0.02 * normal()).join(' ');
+    return [flat * Math.cos(turn), flat * Math.sin(turn), height]
+      .map((x) => radius * x + 0.02 * normalNumber(random))
+      .join(' ');
   };
   const text = Array.from({ length: 5000 }, point).join('\n');
   return { name: 'bowl.xyz', bytes: new TextEncoder().encode(text) };

@@ -6,9 +6,9 @@
 //   for a box whose longest side is 2. The mesh is the reference.
 // - Any other file of points is a cloud without a reference.
 import { readFile } from 'node:fs/promises';
-import { basename, dirname, join, relative } from 'node:path';
-import { randomNumbers } from '../bench/random.mjs';
-import { filesBelow } from './beside.mjs';
+import { basename, dirname, join } from 'node:path';
+import { normalNumber, randomNumbers } from '../bench/random.mjs';
+import { readEach } from './beside.mjs';
 import { SHAPES, surfaceOf } from './made-shapes.mjs';
 import { hasPoisson, poissonOf } from './poisson.mjs';
 import { say } from './shell.mjs';
@@ -87,31 +87,23 @@ async function reported(library, cloud, peer, line) {
   return row;
 }
 
-/** Yields the clouds of a folder; one that cannot be read has a `failure`. */
-async function* cloudsIn(library, folder) {
-  const all = await filesBelow(folder, FILES);
-  for (const path of all.filter((one) => !REFERENCE.test(one))) {
-    const name = relative(folder, path) || basename(path);
-    try {
-      const clouds = [...(await cloudsOf(library, path, name, all))];
-      yield* clouds;
-      clouds[0]?.reference?.free();
-    } catch (failure) {
-      yield { name, failure };
-    }
-  }
+const cloudsIn = (library, folder) =>
+  readEach(folder, FILES, REFERENCE, (path, name, all) => cloudsOf(library, path, name, all));
+
+async function* cloudsOf({ Mesh, parsePoints }, path, name, all) {
+  const bytes = new Uint8Array(await readFile(path));
+  const reference = await referenceOf(Mesh, path, bytes, all);
+  if (reference && !POINTS.test(path)) yield* sampledAll(name, reference);
+  else yield { name, ...parsePoints(bytes), reference };
+  reference?.free();
 }
 
-async function cloudsOf({ Mesh, parsePoints }, path, name, all) {
-  const bytes = new Uint8Array(await readFile(path));
-  if (POINTS.test(path)) {
-    const stem = join(dirname(path), basename(path).replace(POINTS, '.reference.'));
-    const beside = all.find((one) => one.startsWith(stem));
-    const reference = beside && Mesh.parse(new Uint8Array(await readFile(beside)));
-    return [{ name, ...parsePoints(bytes), reference }];
-  }
-  const mesh = asClosed(Mesh, bytes);
-  return mesh ? sampledAll(name, mesh) : [{ name, ...parsePoints(bytes) }];
+/** Returns the mesh with which the clouds of a file are compared: the one beside it or, if the file is a mesh, itself. */
+async function referenceOf(Mesh, path, bytes, all) {
+  if (!POINTS.test(path)) return asClosed(Mesh, bytes);
+  const stem = join(dirname(path), basename(path).replace(POINTS, '.reference.'));
+  const beside = all.find((one) => one.startsWith(stem));
+  return beside && Mesh.parse(new Uint8Array(await readFile(beside)));
 }
 
 /** Returns the mesh of a file, or nothing if it is a file of points; an open mesh is an error. */
@@ -176,8 +168,6 @@ export function sampled(mesh, { count = COUNT, noise = 0, seed = 1 }) {
   }
   return { points, normals };
 }
-
-const normalNumber = (random) => Math.sqrt(-2 * Math.log(random())) * Math.cos(2 * Math.PI * random());
 
 /** Returns a function `at` from a number in (0, 1) to a triangle, each as likely as its share of the area. */
 function trianglesOf(positions, indices) {

@@ -6,8 +6,7 @@
 // - `NAME.truth.json`, if there is one: `point`, a point of the object in world space, and `frame`, where it is there, default 0; without it, what
 //   moves most is tracked. `volumes`: the true volume of each frame, world units cubed. `label`: that of the object in `NAME.truth.EXT`.
 import { readFile } from 'node:fs/promises';
-import { basename, relative } from 'node:path';
-import { filesBelow, filesBeside } from './beside.mjs';
+import { filesBeside, readEach } from './beside.mjs';
 import { imageOf, SEQUENCES, trueSurface } from './made-sequences.mjs';
 
 const VOLUMES = /\.(nii|nii\.gz|nrrd|nhdr|mha|mhd)$/;
@@ -64,19 +63,13 @@ export async function reportSequences(library, folder, line) {
   return areSound;
 }
 
-/** Yields the sequences of a folder; one that cannot be read has a `failure`. */
-async function* sequencesIn(library, folder) {
-  const all = await filesBelow(folder, VOLUMES);
-  for (const path of all.filter((one) => !TRUTH.test(one))) {
-    const name = relative(folder, path) || basename(path);
-    try {
-      const volume = await volumeOf(library, path);
-      if (volume.frames > 1) yield { name, volume, ...(await truthBeside(library, path, all)) };
-      else volume.free();
-    } catch (failure) {
-      yield { name, failure };
-    }
-  }
+const sequencesIn = (library, folder) =>
+  readEach(folder, VOLUMES, TRUTH, (path, name, all) => sequencesOf(library, path, name, all));
+
+async function* sequencesOf(library, path, name, all) {
+  const volume = await volumeOf(library, path);
+  if (volume.frames > 1) yield { name, volume, ...(await truthBeside(library, path, all)) };
+  else volume.free();
 }
 
 async function volumeOf({ Volume }, path) {

@@ -100,8 +100,8 @@ function atLeastOneFailed(code, { passed, failed }) {
 
 /**
  * Stages by group and lane, each with its budget: the seconds that it may take in a fresh clone on two cores, beside the
- * other lane; machines of the same kind differ by a third. The lanes of a group run in parallel; groups, and the stages
- * of a lane, one after the other.
+ * other lane. A stage over its budget is said, but does not fail: machines of the same kind differ by a factor of two.
+ * The lanes of a group run in parallel; groups, and the stages of a lane, one after the other.
  */
 const GROUPS = [
   [
@@ -200,13 +200,7 @@ async function attempt([name, work, budget]) {
   await writeFile(at(LOGS, `${name.replaceAll(' ', '-')}.log`), output);
   if (counts.failed && !echo) process.stdout.write(`\n── ${name}: failed\n${failuresIn(output)}\n`);
   const seconds = (performance.now() - started) / 1000;
-  return { name, budget, missed: counts.missed ?? [], ...withinTwice(budget, { seconds, ...counts }) };
-}
-
-/** Fails a stage that takes more than twice its budget in continuous integration; elsewhere machines differ. */
-function withinTwice(budget, { seconds, passed, failed }) {
-  const isOver = Boolean(process.env.CI) && seconds > 2 * budget;
-  return { seconds, passed, failed: isOver && failed === 0 ? 1 : failed };
+  return { name, budget, seconds, ...counts, missed: counts.missed ?? [] };
 }
 
 /** Records that all tests have passed on the present commit. */

@@ -67,6 +67,19 @@ impl RawStart {
 #[wasm_bindgen]
 pub struct RawDeformable(pub(super) Rc<RefCell<DeformableModel>>);
 
+/// Returns the options of a model of a volume; properties of `params` replace the default parameters for that volume.
+fn options(
+    volume: &RawVolume,
+    frame: usize,
+    start: RawStart,
+    levels: usize,
+    edge: Option<f64>,
+    params: &JsValue,
+) -> Result<DeformableOptions, Failure> {
+    let params = with_overrides(&DeformableParams::for_volume(&volume.0), params)?;
+    Ok(DeformableOptions { frame, start: start.0, levels, edge, params: Some(params) })
+}
+
 /// A model that is being created in slices.
 #[wasm_bindgen]
 pub struct RawDeformableCreation(Pin<Box<dyn Future<Output = Result<DeformableModel, MethodError>>>>);
@@ -83,8 +96,7 @@ impl RawDeformableCreation {
         edge: Option<f64>,
         params: &JsValue,
     ) -> Result<RawDeformableCreation, JsValue> {
-        let params = with_overrides(&DeformableParams::for_volume(&volume.0), params)?;
-        let options = DeformableOptions { frame, start: start.0, levels, edge, params: Some(params) };
+        let options = options(volume, frame, start, levels, edge, params)?;
         let creation = DeformableModel::begin(&volume.0, options).map_err(Failure::from)?;
         Ok(RawDeformableCreation(Box::pin(creation)))
     }
@@ -114,8 +126,7 @@ impl RawDeformable {
         edge: Option<f64>,
         params: &JsValue,
     ) -> Result<RawDeformable, JsValue> {
-        let params = with_overrides(&DeformableParams::for_volume(&volume.0), params)?;
-        let options = DeformableOptions { frame, start: start.0, levels, edge, params: Some(params) };
+        let options = options(volume, frame, start, levels, edge, params)?;
         Ok(RawDeformable(shared(DeformableModel::new(&volume.0, options))?))
     }
 

@@ -705,10 +705,10 @@ fn in_slices<T>(computation: impl Future<Output = T>) -> (T, usize) {
 }
 
 #[test]
-fn a_model_made_and_stepped_in_slices_is_the_same() {
+fn a_model_made_in_slices_is_the_same() {
     let mut random = Random::new(3);
-    let noise = (0..28 * 28 * 28).map(|_| random.unit() as f32).collect();
-    let volume = Volume::new(VolumeInit::new(Voxels::F32(noise), [28, 28, 28, 1])).unwrap();
+    let noise = (0..20 * 20 * 20).map(|_| random.unit() as f32).collect();
+    let volume = Volume::new(VolumeInit::new(Voxels::F32(noise), [20, 20, 20, 1])).unwrap();
     let options = DeformableOptions { levels: 1, ..Default::default() };
     let mut whole = DeformableModel::new(&volume, options.clone()).unwrap();
     let (sliced, slices) = in_slices(DeformableModel::begin(&volume, options).unwrap());
@@ -716,8 +716,7 @@ fn a_model_made_and_stepped_in_slices_is_the_same() {
     assert!(sliced.save() == whole.save());
     assert!(slices > 10, "{slices}");
     for _ in 0..8 {
-        let (report, _) = in_slices(sliced.step_in_slices());
-        assert_eq!(report.unwrap().done, whole.step().unwrap().done);
+        assert_eq!(sliced.step().unwrap().done, whole.step().unwrap().done);
         assert!(sliced.save() == whole.save());
     }
 }

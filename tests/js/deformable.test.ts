@@ -10,7 +10,7 @@ import {
   VesicleError,
   Volume,
 } from '../../pkg/index.js';
-import { ball, ballWithHollowAndPlate, failure, PAPER, rejection, wrong } from './helpers.js';
+import { ball, ballWithHollowAndPlate, failure, noise, PAPER, rejection, wrong } from './helpers.js';
 import { SPONGE_BITS, spongeBits } from './sponge.js';
 
 type Options = ConstructorParameters<typeof DeformableModel>[0];
@@ -573,18 +573,8 @@ test('refresh needs the volume', () => {
   expect(failure(() => fitted.refresh({ min: [0, 0, 0], dims: [1, 1, 1] })).code).toBe('freed');
 });
 
-/** A volume of noise, of which a model is much work. */
-function noise(size: number): Volume {
-  let state = 7;
-  const data = Uint8Array.from({ length: size ** 3 }, () => {
-    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
-    return state >>> 24;
-  });
-  return new Volume({ data, dims: [size, size, size] });
-}
-
 test('a model can be created in slices, with the same bits, and not if that is aborted', async () => {
-  const volume = noise(24);
+  const volume = noise(24, 8);
   const whole = new DeformableModel({ volume, levels: 1 });
   const sliced = await DeformableModel.create({ volume, levels: 1 }, { budgetMs: 0.1 });
   expect(sliced).toBeInstanceOf(DeformableModel);

@@ -22,6 +22,16 @@ export function ball(size: number, radius: number): Volume {
 /** Parameters of the paper's deformable model: uniform sampling, and explicit Euler steps. */
 export const PAPER = { adaptivity: 0, integrator: 'euler' } as const;
 
+/** Returns a volume of noise, which is much work, with `bits` random bits in each voxel. */
+export function noise(size: number, bits: number): Volume {
+  let state = 7;
+  const data = Uint8Array.from({ length: size ** 3 }, () => {
+    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
+    return state >>> (32 - bits);
+  });
+  return new Volume({ data, dims: [size, size, size] });
+}
+
 /**
  * Returns a volume of 48³ voxels: a bright ball of radius 14 with a concentric hollow of radius 6 and, apart from it, a
  * plate two voxels thick.

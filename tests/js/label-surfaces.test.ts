@@ -1,6 +1,6 @@
 import { expect, test } from 'vitest';
 import { LabelSurfaces, Mesh, paramSpecs, type Vec3, Volume } from '../../pkg/index.js';
-import { ball, failure, rejection } from './helpers.js';
+import { ball, failure, noise, rejection } from './helpers.js';
 
 const DIMS: Vec3 = [12, 10, 8];
 
@@ -165,18 +165,8 @@ test('longer edges give fewer triangles, and the same voxels, also after a chang
   expect(coarse.mesh(1).arrays()).toEqual(fine.mesh(1).arrays());
 });
 
-/** A label map of noise, which is much work. */
-function noise(size: number): Volume {
-  let state = 7;
-  const data = Uint8Array.from({ length: size ** 3 }, () => {
-    state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
-    return state >>> 31;
-  });
-  return new Volume({ data, dims: [size, size, size] });
-}
-
 test('they can be created in slices, with the same bits, and not if that is aborted', async () => {
-  const volume = noise(16);
+  const volume = noise(16, 1);
   const whole = new LabelSurfaces({ volume });
   const sliced = await LabelSurfaces.create({ volume }, { budgetMs: 0.1 });
   expect(sliced).toBeInstanceOf(LabelSurfaces);
@@ -193,7 +183,7 @@ test('they can be created in slices, with the same bits, and not if that is abor
 });
 
 test('a run that is aborted within a step leaves surfaces on which nothing is half done', async () => {
-  const volume = noise(16);
+  const volume = noise(16, 1);
   const [whole, sliced] = [new LabelSurfaces({ volume }), new LabelSurfaces({ volume })];
   const reports: number[] = [];
   const stop = new AbortController();

@@ -386,20 +386,11 @@ impl DeformableModel {
     /// option `edge` is too long for the object. [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not
     /// suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
-        finished(self.step_in_slices())
-    }
-
-    /// Makes one iteration as [`Self::step`] does, in [slices](crate::pauses); on a sparse volume without a pause.
-    ///
-    /// # Errors
-    /// As [`Self::step`].
-    pub async fn step_in_slices(&mut self) -> Result<StepReport, MethodError> {
-        if self.pyramid.is_sparse() { self.step_if_loaded() } else { self.iterate(None).await }
+        if self.pyramid.is_sparse() { self.step_if_loaded() } else { self.iterate(None) }
     }
 
     /// Makes one iteration; on a sparse volume `before` is completed, by which it can be undone.
-    async fn iterate(&mut self, before: Option<&mut Before>) -> Result<StepReport, MethodError> {
-        let pauses = &Pauses::default();
+    fn iterate(&mut self, before: Option<&mut Before>) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = std::mem::take(&mut self.refreshed);
         if !self.is_done() {
@@ -410,10 +401,10 @@ impl DeformableModel {
             }
             if self.params.topology == Topology::Adaptive {
                 let active = self.vertices_to_check();
-                changes += self.restore_bounds(&active, &mut times, pauses).await;
+                changes += self.restore_bounds(&active, &mut times);
             }
             self.iteration += 1;
-            changes += self.update_convergence(&mut times, pauses).await?;
+            changes += self.update_convergence(&mut times)?;
             self.count_components(changes);
             if let Some(most) = self.resolver.take_overflow() {
                 return Err(MethodError::TooManyVertices { most });
@@ -488,14 +479,14 @@ impl DeformableModel {
 
     /// Restores edge bounds and resolves contacts around the vertices `active`, wakes the edited vertices and their
     /// neighbours, and renumbers the mesh if too few of its slots are live. Returns the numbers of edits.
-    async fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times, pauses: &Pauses) -> Changes {
+    fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times) -> Changes {
         let begin = (self.clock)();
         let sampling = self.sampling();
         let changes = {
             let image = &self.pyramid.levels[self.level];
             let guide =
                 image_guide::guide_within(image, self.level_iso, &self.params, self.followed_bounds());
-            self.resolver.resolve_in_slices(&mut self.mesh, sampling, active, &*guide, pauses).await
+            self.resolver.resolve_guided(&mut self.mesh, sampling, active, &*guide)
         };
         let since_edit = self.mesh.scalar_mut(self.keys.since_edit);
         self.resolver.edited().iter().for_each(|v| since_edit[v.index()] = 0.0);

@@ -13,7 +13,6 @@ use super::{DeformableModel, Topology};
 use crate::math::{Bounds, Vec3};
 use crate::mesh::VertexId;
 use crate::methods::{MethodError, Times};
-use crate::pauses::{Pauses, finished};
 use crate::volume::{Grid, Region, Volume};
 
 /// The distance, in voxels of the current level, from changed voxels within which vertices wake: beyond it, no sample of
@@ -132,7 +131,7 @@ impl DeformableModel {
         }
         let mut active = added.clone();
         self.mesh.add_neighbours(&mut active);
-        let changes = finished(self.restore_bounds(&active, &mut Times::default(), &Pauses::default()));
+        let changes = self.restore_bounds(&active, &mut Times::default());
         self.count_components(changes);
         self.refreshed += changes;
         Ok(Some(added.len()))

@@ -12,7 +12,6 @@ use super::{DeformableModel, MEAN_EDGE, Topology};
 use crate::math::{Vec3, triangle};
 use crate::mesh::{DisjointSets, Mesh, TriangleMesh, VertexId};
 use crate::methods::{MethodError, StepReport, Times};
-use crate::pauses::{Pauses, finished};
 use crate::remesh::Changes;
 use crate::spatial::{CellSet, TriangleTree};
 use crate::volume::{Grid, Subdivided, marching_cubes, voxels_inside};
@@ -42,7 +41,7 @@ impl DeformableModel {
     pub fn seed(&mut self) -> Result<StepReport, MethodError> {
         self.check_is_whole()?;
         let mut times = Times::default();
-        let changes = finished(self.seed_missing(&mut times, &Pauses::default()))?;
+        let changes = self.seed_missing(&mut times)?;
         if changes.seeds > 0 {
             self.wake_all();
             self.count_components(changes);
@@ -52,11 +51,7 @@ impl DeformableModel {
 
     /// Adds closed contours of the matter and the cavities on this level that the mesh lacks, and restores edge bounds
     /// and contacts around them. Returns the numbers of edits, with that of the contours as `seeds`.
-    pub(super) async fn seed_missing(
-        &mut self,
-        times: &mut Times,
-        pauses: &Pauses,
-    ) -> Result<Changes, MethodError> {
+    pub(super) fn seed_missing(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
         if self.params.iso_force == 0.0 || self.params.topology == Topology::Fixed {
             return Ok(Changes::default());
         }
@@ -74,7 +69,7 @@ impl DeformableModel {
             if self.convergence.sized {
                 self.set_sizes_of(&added);
             }
-            changes += self.restore_bounds(&added, times, pauses).await;
+            changes += self.restore_bounds(&added, times);
         }
         Ok(changes)
     }

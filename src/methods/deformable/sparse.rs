@@ -198,7 +198,7 @@ impl DeformableModel {
     /// Makes one iteration if all bricks that it reads are loaded.
     pub(super) fn step_if_loaded(&mut self) -> Result<StepReport, MethodError> {
         let Some(SparseLevels { volume, finest, .. }) = self.pyramid.sparse.clone() else {
-            return finished(self.iterate(None));
+            return self.iterate(None);
         };
         // Locked all the time, so that other models of the volume wait.
         let mut bricks = volume.bricks();
@@ -223,7 +223,7 @@ impl DeformableModel {
             return Err(needs);
         }
         let (mut before, level) = (self.before(), self.level);
-        let result = finished(self.iterate(Some(&mut before)));
+        let result = self.iterate(Some(&mut before));
         let result = self.check_missed().and(result);
         if let Err(MethodError::NeedsData { .. }) = result {
             self.undo(before);
