@@ -29,6 +29,8 @@ struct Scene {
     radii: [f64; FRAMES],
     pillar: f64,
     noise: f64,
+    /// Intensity of a wall around the ball, seven units thick.
+    muscle: f64,
 }
 
 impl Scene {
@@ -41,6 +43,7 @@ impl Scene {
             radii: std::array::from_fn(|t| 17.5 + 2.5 * libm::cos(TAU * t as f64 / FRAMES as f64)),
             pillar: 4.0,
             noise: 8.0,
+            muscle: AROUND,
         }
     }
 
@@ -55,6 +58,7 @@ impl Scene {
         match () {
             () if p.x < 4.0 => WALL,
             () if p.distance(Self::center(t)) < self.radii[t] && from_axis > self.pillar => BALL,
+            () if p.distance(Self::center(t)) < self.radii[t] + 7.0 => self.muscle,
             () => AROUND,
         }
     }
@@ -154,6 +158,23 @@ fn a_point_a_box_or_nothing_is_enough_for_a_proposal() {
     let center = scene.world(Scene::center(0));
     let corners = [center - reach, center + reach];
     scene.assert_fits(&SurfaceTracker::propose(&volume, Query::Box(corners)).unwrap());
+}
+
+/// As around the blood of a heart: the step from muscle to lung is nearly as high as that from blood to muscle.
+#[test]
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+fn the_edge_of_what_is_around_an_object_is_not_its_own() {
+    let radii = [15.0, 14.0, 12.0, 11.0, 12.0, 14.0];
+    let scene = Scene { muscle: 105.0, radii, pillar: 0.0, ..Scene::new() };
+    let volume = scene.volume();
+    let query = Query::Point { at: scene.world(Scene::center(0)), frame: 0 };
+    let proposal = SurfaceTracker::propose(&volume, query).unwrap();
+    let tracker = tracked(options(volume, &proposal, Cavity::Closed));
+    let truths: Vec<f64> = (0..FRAMES).map(|t| scene.truth(t)).collect();
+    println!("{} {:.0?} {truths:.0?}", proposal.threshold, tracker.volumes());
+    for (t, found) in tracker.volumes().iter().enumerate() {
+        assert!((found / truths[t] - 1.0).abs() < 0.1, "{t} {found} {}", truths[t]);
+    }
 }
 
 #[test]

@@ -40,6 +40,12 @@ const WINDOW: f64 = 5.0;
 /// blood.
 const THRESHOLD: f64 = 0.6;
 
+/// The proposed threshold in units of the step between two kinds of surroundings, as muscle and lung, whose means lie closer
+/// than they do; and most of it as a share of the step between the object and its surroundings, beyond which parts of the
+/// object are lost.
+const THRESHOLD_AROUND: f64 = 1.05;
+const MOST_OF_STEP: f64 = 0.9;
+
 /// Margin between the object and the sides of the box, as a share of the extent of the object, and in voxels. The tracker
 /// finds boundaries in windows of five voxels.
 const MARGIN: f64 = 0.2;
@@ -253,6 +259,8 @@ struct Found {
     /// The mean quantised intensities of the object and of what is dark around it, in all frames.
     inside: f64,
     outside: f64,
+    /// The step between the two kinds of what is dark in the box around the object.
+    step_around: f64,
 }
 
 impl Found {
@@ -288,9 +296,11 @@ impl Found {
         let middle = sequence.lattice.index(window.in_sequence(window.lattice.at(middle)));
         let union: Vec<bool> =
             (0..window.lattice.len()).map(|i| masks.iter().flatten().any(|mask| mask[i])).collect();
-        let ends = window.lattice.bounds(&union)?.map(|at| window.in_sequence(at));
+        let ends = window.lattice.bounds(&union)?;
         let [inside, outside] = sums.means()?;
-        Some(Self { frame: first, middle, ends, inside, outside })
+        let step_around = window.step_around(sequence, &masks, ends, levels.level, pauses).await;
+        let ends = ends.map(|at| window.in_sequence(at));
+        Some(Self { frame: first, middle, ends, inside, outside, step_around })
     }
 
     /// Returns the number of ends of the image that the object reaches, along axes with more than one voxel.
@@ -306,19 +316,22 @@ impl Found {
         let [first, last] = self.ends.map(|at| sequence.in_volume(at));
         // Beyond the last voxel that was kept are those that were left out.
         let next = sequence.in_volume(self.ends[1].map(|i| i + 1));
-        let margin = |k: usize| {
-            let share = libm::ceil(MARGIN * (last[k] - first[k] + 1) as f64) as usize;
-            share.max(MARGIN_IN_VOXELS) + next[k] - last[k] - 1
-        };
+        let margin = |k: usize| margin(last[k] - first[k] + 1) + next[k] - last[k] - 1;
         let low = [0, 1, 2].map(|k| first[k].saturating_sub(margin(k)).max(within[0][k]));
         [low, [0, 1, 2].map(|k| (last[k] + margin(k)).min(within[1][k]))]
     }
 
     /// Returns the edge threshold, in units of intensity.
     fn threshold(&self, sequence: &CoarseSequence) -> f64 {
-        let step = (THRESHOLD * (self.inside - self.outside)).max(2.5 * sequence.noise);
-        step * sequence.quantum
+        let step = self.inside - self.outside;
+        let around = (THRESHOLD_AROUND * self.step_around).min(MOST_OF_STEP * step);
+        (THRESHOLD * step).max(around).max(2.5 * sequence.noise) * sequence.quantum
     }
+}
+
+/// Returns the margin between an object of an extent and a side of the box, in voxels.
+fn margin(extent: usize) -> usize {
+    (libm::ceil(MARGIN * extent as f64) as usize).max(MARGIN_IN_VOXELS)
 }
 
 /// Sums of the quantised intensities of an object and of its surroundings.
@@ -393,6 +406,36 @@ impl Window {
             let start = sequence.lattice.index(self.in_sequence(at));
             sequence.frames[frame][start..start + nx].iter().copied()
         })
+    }
+
+    /// Returns the difference of the means of the two kinds of dark voxels, in the box around the object between the voxels
+    /// `ends` in all frames; 0 if there is one kind only.
+    async fn step_around(
+        &self,
+        sequence: &CoarseSequence,
+        masks: &[Option<Vec<bool>>],
+        ends: [[usize; 3]; 2],
+        level: f32,
+        pauses: &Pauses,
+    ) -> f64 {
+        let [first, last] = ends;
+        let is_near = |at: [usize; 3]| {
+            (0..3).all(|k| {
+                let margin = margin(last[k] - first[k] + 1);
+                (first[k].saturating_sub(margin)..=last[k] + margin).contains(&at[k])
+            })
+        };
+        let near: Vec<bool> = (0..self.lattice.len()).map(|i| is_near(self.lattice.at(i))).collect();
+        let mut counts = vec![0; 256];
+        for (frame, mask) in masks.iter().enumerate().filter_map(|(t, mask)| Some((t, mask.as_ref()?))) {
+            for (i, value) in self.values(sequence, frame).enumerate() {
+                if near[i] && !mask[i] && f32::from(value) <= level {
+                    counts[usize::from(value)] += 1;
+                }
+            }
+            pauses.after(near.len() / 128 + 1).await;
+        }
+        two_kinds(&counts).map_or(0.0, |kinds| kinds.bright - kinds.dark)
     }
 
     /// Returns the voxels of a frame that are brighter than a level, smoothed.

@@ -1,8 +1,8 @@
 //! Warnings about a tracked sequence: frames in which the object ends or begins, and those in which its
 //! surface is uncertain.
 
-use super::SurfaceTracker;
 use super::region::Region;
+use super::{Cavity, SurfaceTracker};
 use crate::mesh::{TriangleMesh, measure};
 use crate::warning::{Place, Warning, WarningCode};
 
@@ -57,13 +57,14 @@ impl SurfaceTracker {
             if is_there {
                 // Steps at the surface of a small object are not those of its boundary.
                 warnings.extend(self.small_object(frame).or_else(|| self.uneven_brightness(frame)));
-                warnings.extend(self.missing_boundary(frame));
                 warnings.extend(self.volume_jump(frame));
             }
         }
         warnings.extend(self.cycle_warning());
+        warnings.extend(self.missing_boundary());
         warnings.extend(self.warning_of_frames(|facts| facts.is_cut, cut_by_box));
-        warnings.extend(self.warning_of_frames(|facts| facts.genus > 0, has_handles));
+        let with_handles = |frames| has_handles(frames, self.cavity);
+        warnings.extend(self.warning_of_frames(|facts| facts.genus > 0, with_handles));
         warnings
     }
 
@@ -72,26 +73,28 @@ impl SurfaceTracker {
     fn warning_of_frames(
         &self,
         is_true: impl Fn(&SurfaceFacts) -> bool,
-        text: fn(usize) -> (WarningCode, String),
+        text: impl Fn(usize) -> (WarningCode, String),
     ) -> Option<Warning> {
         let first = self.facts.iter().position(&is_true)?;
         let (code, text) = text(self.facts.iter().filter(|facts| is_true(facts)).count());
         Some(Warning::at(code, Place::Frame(first as u32), text))
     }
 
-    /// Returns a warning if the image shows no boundary at much of the surface.
-    fn missing_boundary(&self, frame: usize) -> Option<Warning> {
-        let statistics = &self.statistics[frame];
-        // Closed surfaces have about twice as many triangles as vertices.
-        let share = 2.0 * statistics.without_boundary as f64 / statistics.triangles.max(1) as f64;
-        (share > WITHOUT_BOUNDARY).then(|| {
-            let percent = (100.0 * share.min(1.0)) as u32;
-            let text = format!(
-                "the image shows no boundary at {percent} % of the surface, which is a guess there: lower the edge \
-                 threshold, or use another box"
-            );
-            Warning::at(WarningCode::NoBoundary, Place::Frame(frame as u32), text)
-        })
+    /// Returns a warning about the frames in which the image shows no boundary at much of the surface, placed in the first.
+    fn missing_boundary(&self) -> Option<Warning> {
+        let shares = self.statistics.iter().enumerate().map(|(frame, statistics)| {
+            // Closed surfaces have about twice as many triangles as vertices.
+            (frame, 2.0 * statistics.without_boundary as f64 / statistics.triangles.max(1) as f64)
+        });
+        let much: Vec<_> = shares.filter(|(_, share)| *share > WITHOUT_BOUNDARY).collect();
+        let &(first, _) = much.first()?;
+        let percent = (100.0 * much.iter().map(|(_, share)| share.min(1.0)).fold(0.0, f64::max)) as u32;
+        let text = format!(
+            "the image shows no boundary at up to {percent} % of the surface in {} frames, from this one on; it is a guess \
+             there: lower the edge threshold, or use another box",
+            much.len()
+        );
+        Some(Warning::at(WarningCode::NoBoundary, Place::Frame(first as u32), text))
     }
 
     /// Returns a warning if the volume differs too much from those of both frames beside it.
@@ -206,10 +209,11 @@ fn cut_by_box(frames: usize) -> (WarningCode, String) {
     (WarningCode::TouchesBox, text)
 }
 
-fn has_handles(frames: usize) -> (WarningCode, String) {
+fn has_handles(frames: usize, cavity: Cavity) -> (WarningCode, String) {
+    let close = if cavity == Cavity::Open { "close its cavity, " } else { "" };
     let text = format!(
-        "the surface has handles in {frames} frames, from this one on: muscles that cross the object, or noise; close its cavity, \
-         raise the edge threshold, or use a larger window"
+        "the surface has handles in {frames} frames, from this one on: muscles that cross the object, or noise; {close}raise \
+         the edge threshold, or use a larger window"
     );
     (WarningCode::Handles, text)
 }
