@@ -166,7 +166,7 @@ fn a_point_a_box_or_nothing_is_enough_for_a_proposal() {
 fn the_edge_of_what_is_around_an_object_is_not_its_own() {
     let radii = [15.0, 14.0, 12.0, 11.0, 12.0, 14.0];
     let scene = Scene { muscle: 105.0, radii, pillar: 0.0, ..Scene::new() };
-    let volume = scene.volume();
+    let volume = scene.volume().enrich_slices(None, Enrichment::Flow).unwrap();
     let query = Query::Point { at: scene.world(Scene::center(0)), frame: 0 };
     let proposal = SurfaceTracker::propose(&volume, query).unwrap();
     let tracker = tracked(options(volume, &proposal, Cavity::Closed));
