@@ -20,9 +20,14 @@ impl Pauses {
         let done = self.0.get().saturating_add(u32::try_from(work).unwrap_or(u32::MAX));
         self.0.set(done);
         if done >= SLICE {
-            self.0.set(0);
-            pause().await;
+            self.now().await;
         }
+    }
+
+    /// Pauses, after work that is no multiple of anything.
+    pub async fn now(&self) {
+        self.0.set(0);
+        pause().await;
     }
 }
 

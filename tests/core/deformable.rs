@@ -12,6 +12,7 @@ use vesicle::methods::deformable::{
 use vesicle::methods::{MethodError, StepReport};
 use vesicle::pauses::advance;
 use vesicle::volume::{Volume, VolumeInit, Voxels};
+use vesicle::warning::WarningCode;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -702,6 +703,23 @@ fn in_slices<T>(computation: impl Future<Output = T>) -> (T, usize) {
             Poll::Ready(result) => return (result, slices),
         }
     }
+}
+
+#[test]
+fn an_image_of_one_intensity_is_told() {
+    let codes = |values: Vec<f32>| {
+        let volume = Volume::new(VolumeInit::new(Voxels::F32(values), [6, 6, 6, 2])).unwrap();
+        [0, 1].map(|frame| {
+            let options = DeformableOptions { frame, ..Default::default() };
+            let report = DeformableModel::new(&volume, options).unwrap().step().unwrap();
+            report.warnings.into_iter().map(|warning| warning.code).collect::<Vec<_>>()
+        })
+    };
+    let flat = vec![WarningCode::NoBoundary];
+    assert_eq!(codes(vec![0.0; 432]), [flat.clone(), flat.clone()]);
+    let mut values = vec![7.0; 432];
+    values[86] = 9.0;
+    assert_eq!(codes(values), [vec![], flat]);
 }
 
 #[test]

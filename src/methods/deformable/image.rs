@@ -11,6 +11,7 @@ use super::contour::ObjectIs;
 use crate::math::order::median;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
+use crate::pauses::{Pauses, finished};
 use crate::volume::{
     BrickGrid, CellCache, Grid, NotFinite, Padding, Region, SparseVolume, Subdivided, VectorGrid, Volume,
 };
@@ -330,6 +331,9 @@ impl LevelImage {
     }
 }
 
+/// Number of voxels of a pass over the image that count as one unit of work between pauses.
+const VOXELS_PER_UNIT: usize = 512;
+
 /// The image pyramid of one frame, finest level first, and the range by which its intensities are normalised.
 #[derive(Clone, Debug)]
 pub(super) struct Pyramid {
@@ -344,6 +348,8 @@ pub(super) struct Pyramid {
     /// The lowest intensity of the volume, and its range: those above, unless differences across the iso value are too
     /// small for that.
     volume_range: [f64; 2],
+    /// Whether all voxels of the frame have the same intensity; not known of a sparse volume.
+    is_flat: bool,
     /// The volume and the index of its frame, if what is normalised to 0..1 may depend on the iso value.
     source: Option<(Volume, usize)>,
     /// The voxels of the finest level that are not finite. Their values depend on the iso value and the side of it on
@@ -382,6 +388,20 @@ impl Pyramid {
         above: usize,
         params: &DeformableParams,
     ) -> Result<Self, MethodError> {
+        finished(Self::in_slices(volume, frame, above, params, &Pauses::default()))
+    }
+
+    /// Makes a pyramid as [`Self::new`] does, with pauses between passes over the voxels.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(super) async fn in_slices(
+        volume: &Volume,
+        frame: usize,
+        above: usize,
+        params: &DeformableParams,
+        pauses: &Pauses,
+    ) -> Result<Self, MethodError> {
         let parts = parts_of_whole(volume.spacing(), volume.dims());
         let possible = max_levels(volume);
         if above > possible {
@@ -389,10 +409,14 @@ impl Pyramid {
             let problem = format!("must be from 0 to {possible} for {nx} × {ny} × {nz} voxels, got {above}");
             return Err(MethodError::invalid("levels", problem));
         }
+        let pass = volume.dims().iter().product::<usize>() / VOXELS_PER_UNIT + 1;
         let grid = volume.normalised_grid(frame)?;
+        pauses.after(pass).await;
         let hash = hash_of(&grid, Region { min: [0; 3], dims: volume.dims() });
         let volume_range = [volume.range()[0], volume.span()];
         let divided = [0, 1, 2].map(|axis| grid.dims[axis] * parts[axis]);
+        let is_flat = grid.values.iter().all(|value| *value == grid.values[0]);
+        pauses.after(pass).await;
         let mut pyramid = Self {
             levels: vec![LevelImage::new(grid, parts, divided)],
             spacing: volume.spacing(),
@@ -400,12 +424,14 @@ impl Pyramid {
             low: volume_range[0],
             range: volume_range[1],
             volume_range,
+            is_flat,
             source: None,
             not_finite: volume.not_finite(frame)?,
             made_for: (params.iso, ObjectIs::by(params)),
             hash,
             sparse: None,
         };
+        pauses.after(pass).await;
         if let Some([low, high]) = volume.window_at(params.iso, frame)? {
             [pyramid.low, pyramid.range] = [low, high - low];
             pyramid.levels = vec![LevelImage::new(volume.grid_in([low, high], frame)?, parts, divided)];
@@ -413,8 +439,10 @@ impl Pyramid {
         if pyramid.is_windowed() || volume.is_wide(frame)? {
             pyramid.source = Some((volume.clone(), frame));
         }
+        pauses.after(pass).await;
         pyramid.set_not_finite(params);
         pyramid.build_levels(above)?;
+        pauses.after(pass).await;
         Ok(pyramid)
     }
 
@@ -538,6 +566,7 @@ impl Pyramid {
             low: volume_range[0],
             range: volume_range[1],
             volume_range,
+            is_flat: false,
             source: None,
             not_finite: None,
             made_for: (0.0, ObjectIs::Brighter),
@@ -666,18 +695,24 @@ impl Pyramid {
 
     /// Returns the warnings about results on this image.
     pub(super) fn warnings(&self) -> Vec<Warning> {
+        self.elongated().into_iter().chain(self.flat()).collect()
+    }
+
+    fn elongated(&self) -> Option<Warning> {
         let spacing = self.spacing();
         let [shortest, longest] =
             [f64::min, f64::max].map(|of| spacing.into_iter().reduce(of).unwrap_or(1.0));
-        if longest / shortest <= MAX_RATIO {
-            return Vec::new();
-        }
         let ratio = self.spacing.into_iter().fold(0.0, f64::max) / shortest;
         let text = format!(
             "voxels are {ratio:.0} times as long as wide: between their centres the shape is a guess, and the surface has \
              steps; interpolate slices (enrichSlices) or resample the volume first"
         );
-        vec![Warning::new(WarningCode::Anisotropic, text)]
+        (longest / shortest > MAX_RATIO).then(|| Warning::new(WarningCode::Anisotropic, text))
+    }
+
+    fn flat(&self) -> Option<Warning> {
+        let text = "all voxels have the same intensity: the image shows no boundary, and a surface in it means nothing";
+        self.is_flat.then(|| Warning::new(WarningCode::NoBoundary, text))
     }
 
     /// Returns the map from model space to world space for a volume with the affine transform `affine`.

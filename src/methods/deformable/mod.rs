@@ -285,7 +285,7 @@ impl DeformableModel {
         finished(Self::begin(volume, options)?)
     }
 
-    /// Begins to create a model as [`Self::new`] does, in [slices](crate::pauses); the volume is not needed any more.
+    /// Begins to create a model as [`Self::new`] does, in [slices](crate::pauses).
     ///
     /// # Errors
     /// As [`Self::new`], now or at the end.
@@ -295,9 +295,14 @@ impl DeformableModel {
     ) -> Result<impl Future<Output = Result<Self, MethodError>> + use<>, MethodError> {
         let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
         params.validate()?;
-        let pyramid = Pyramid::new(volume, options.frame, options.levels, &params)?;
-        let origin = Origin { frame: options.frame, start: options.start, edge: options.edge, params };
-        Ok(Self::from_pyramid(pyramid, volume.affine(), origin))
+        let DeformableOptions { frame, start, levels, edge, .. } = options;
+        let volume = volume.clone();
+        Ok(async move {
+            let pauses = Pauses::default();
+            let pyramid = Pyramid::in_slices(&volume, frame, levels, &params, &pauses).await?;
+            let affine = volume.affine();
+            Self::from_pyramid(pyramid, affine, Origin { frame, start, edge, params }, &pauses).await
+        })
     }
 
     /// Returns the largest [`DeformableOptions::levels`] for a volume: each level has at least two voxels along every
@@ -306,8 +311,12 @@ impl DeformableModel {
         image::max_levels(volume)
     }
 
-    async fn from_pyramid(pyramid: Pyramid, affine: DAffine3, origin: Origin) -> Result<Self, MethodError> {
-        let pauses = Pauses::default();
+    async fn from_pyramid(
+        pyramid: Pyramid,
+        affine: DAffine3,
+        origin: Origin,
+        pauses: &Pauses,
+    ) -> Result<Self, MethodError> {
         let Origin { frame, start, edge, params } = origin;
         let to_world = pyramid.to_world(&affine);
         let voxel = libm::cbrt(to_world.matrix3.determinant().abs());
@@ -318,12 +327,13 @@ impl DeformableModel {
         let context = StartContext::of(&pyramid, &params, domain, delta, &to_world);
         let from_contour = start == Start::Contour;
         let contour = if from_contour { contour_mesh(&context)? } else { None };
+        pauses.now().await;
         let begins_on_contour = contour.is_some();
         let mut mesh = match contour {
             Some(mesh) => mesh,
             None => {
                 let guide = image_guide::guide(context.image, context.iso, &params);
-                start.make(&context, |value| pyramid.normalised(value), &*guide, &pauses).await?
+                start.make(&context, |value| pyramid.normalised(value), &*guide, pauses).await?
             }
         };
         let keys = Keys::added_to(&mut mesh);
@@ -355,7 +365,7 @@ impl DeformableModel {
             refreshed: Changes::default(),
             clock: || 0.0,
         };
-        model.begin_on(begins_on_contour, &pauses).await?;
+        model.begin_on(begins_on_contour, pauses).await?;
         Ok(model)
     }
 
@@ -363,6 +373,7 @@ impl DeformableModel {
     async fn begin_on(&mut self, contour: bool, pauses: &Pauses) -> Result<(), MethodError> {
         self.watch_output();
         self.prepare_level()?;
+        pauses.now().await;
         if contour {
             self.resolve_contour(pauses).await?
         } else {

@@ -20,7 +20,7 @@ use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Connectivity, Mesh, ScalarKey, VertexId};
 use crate::methods::saved::Hash;
 use crate::methods::{MethodError, StepReport};
-use crate::pauses::finished;
+use crate::pauses::{Pauses, finished};
 use crate::remesh::{Changes, Pending};
 use crate::volume::{BrickBox, BrickGrid, BrickId, CellCache, SparseVolume, merged};
 use fixedbitset::FixedBitSet;
@@ -182,7 +182,7 @@ impl DeformableModel {
         let affine = volume.levels()[options.finest].affine;
         let follow = follow(volume, &options, &pyramid.to_world(&affine))?;
         let origin = Origin { frame: 0, start: options.start, edge: options.edge, params };
-        let mut model = finished(Self::from_pyramid(pyramid, affine, origin))?;
+        let mut model = finished(Self::from_pyramid(pyramid, affine, origin, &Pauses::default()))?;
         model.follow = follow;
         Ok(model)
     }
