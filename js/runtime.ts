@@ -93,7 +93,14 @@ export function call<T>(work: () => T): T {
 function translate(error: unknown): unknown {
   if (error instanceof Error) return isFatal(error) ? crashed(error.message, error) : error;
   const { code, message } = error as { code: ErrorCode | 'panic'; message: string };
-  return code === 'panic' ? crashed(message, error) : new VesicleError(code, message);
+  return code === 'panic' ? crashed(message, error) : new VesicleError(code, withExponents(message));
+}
+
+/** Returns a message in which numbers of very many digits, which the module writes out, are as JavaScript has them. */
+function withExponents(message: string): string {
+  // Names have quotation marks around them, and identifiers have dots.
+  const long = /(^|[\s([])(-?(?:\d{22,}|0\.0{6,}\d+))(?=[\s,;)\]]|$)/g;
+  return message.replace(long, (_, before: string, digits: string) => before + Number(digits));
 }
 
 // Traps and stack overflows leave the instance's memory in an undefined state.

@@ -17,13 +17,22 @@ export function listed(items: readonly string[], between = ', '): string {
   return first.join(between) + (items.length > 3 ? ` and ${items.length - 3} more` : '');
 }
 
-/** Returns what an error of another library says. */
+/** Beginning of messages of dicom-parser: the name of a function. */
+const PARSER = /^(?:dicomParser|\w+ByteArrayParser)[.:][\w.]+:? (?:- )?/;
+
+/** Returns what an error of another library says; of dicom-parser, in our words. */
 export function reasonOf(error: unknown): string {
   const { exception } = Object(error) as { exception?: unknown };
   if (exception !== undefined) return reasonOf(exception);
   if (error instanceof RangeError && /call stack/.test(error.message)) return 'sequences are nested too deeply';
-  // Messages of dicom-parser begin with the name of the function.
-  return libraryReason(error)
-    .replace(/^dicomParser\.\w+: /, '')
-    .slice(0, 200);
+  const reason = libraryReason(error);
+  return (PARSER.test(reason) ? parserReason(reason) : reason).slice(0, 200);
+}
+
+function parserReason(reason: string): string {
+  const [, at] = /not found at offset (\d+)/.exec(reason) ?? [];
+  if (at !== undefined) return `it is damaged at byte ${at}: an item of a sequence has to begin there`;
+  if (/overrun|overread|past end of buffer/.test(reason)) return 'it is cut off, or states a length beyond its end';
+  if (/missing required|not found/.test(reason)) return `it is damaged: ${reason.replace(PARSER, '')}`;
+  return 'it is damaged';
 }

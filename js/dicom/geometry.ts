@@ -17,6 +17,12 @@ const SIDEWAYS = 0.1;
 /** Largest factor by which resampling adds slices. */
 const MOST_ADDED = 4;
 
+/**
+ * Smallest and largest distance of voxels, millimetres, and smallest volume that their three directions span: those of
+ * volumes.
+ */
+const [NEAREST, FURTHEST, FLATTEST] = [1e-12, 1e12, 1e-8];
+
 /** How slices are spaced. */
 export type Evenness =
   /** At equal distances; `note` says if some are slightly off. */
@@ -142,6 +148,17 @@ export function affineOf(slices: readonly Frame[], count: number, single = 1): n
   const normal = cross(along, down);
   const step = count > 1 ? minus(last.position, position).map((x) => x / (count - 1)) : normal.map((x) => x * single);
   return [...along.map((x) => x * spacing[0]), 0, ...down.map((x) => x * spacing[1]), 0, ...step, 0, ...position, 1];
+}
+
+/** Returns why no volume can be where this transform places it; undefined if one can. */
+export function placementProblem(affine: readonly number[]): string | undefined {
+  const axes = [0, 4, 8].map((at) => affine.slice(at, at + 3) as Vec3) as [Vec3, Vec3, Vec3];
+  const lengths = axes.map((axis) => Math.hypot(...axis)) as Vec3;
+  const wrong = lengths.findIndex((length) => !(length > NEAREST && length < FURTHEST));
+  const what = wrong === 2 ? 'slices' : 'pixels';
+  if (wrong >= 0) return `${what} are ${shown(lengths[wrong] ?? 0)} apart, which cannot be`;
+  const [along, down, through] = axes.map((axis, k) => axis.map((x) => x / (lengths[k] ?? 1))) as [Vec3, Vec3, Vec3];
+  return Math.abs(dot(cross(along, down), through)) < FLATTEST ? 'all slices are in one plane' : undefined;
 }
 
 /** Returns the angle between the normal of slices and the line through them, degrees: the tilt of the gantry. */

@@ -20,7 +20,7 @@ import type { InputFiles } from '../input-file.js';
 import { withPause } from '../pause.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import { badDicom, listed } from './error.js';
-import { evennessOf } from './geometry.js';
+import { affineOf, evennessOf, placementProblem } from './geometry.js';
 import { type Conflict, grouped, isNearlyParallel, type Stack, stacksOf } from './grouping.js';
 import { framesIn } from './header.js';
 import { importParser, type Parser, readHeader } from './parser.js';
@@ -157,7 +157,9 @@ function usable(stack: Stack | Conflict): Stack | Conflict {
   const images = stack.frames.flat();
   if (slices.length === 1) return { images, reason: 'a single image, which is no volume' };
   const evenness = evennessOf(slices);
-  return evenness.kind === 'shifted' ? { images, reason: evenness.reason } : stack;
+  if (evenness.kind === 'shifted') return { images, reason: evenness.reason };
+  const reason = placementProblem(affineOf(slices, evenness.kind === 'uneven' ? evenness.count : slices.length));
+  return reason === undefined ? stack : { images, reason };
 }
 
 const firstOf = ({ frames }: Stack) => frames[0]?.[0] as Frame;

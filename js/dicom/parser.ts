@@ -1,6 +1,7 @@
 // The data sets of DICOM files, by dicom-parser.
 import type { DataSet, Element } from 'dicom-parser';
 import { invalid } from '../check.js';
+import { isSmall, limitOfSmall, mostUnpacked } from '../small-files.js';
 import { badDicom, reasonOf } from './error.js';
 import type { Source } from './source.js';
 
@@ -165,11 +166,15 @@ export async function inflate(bytes: Uint8Array): Promise<Uint8Array> {
     .pipeThrough(new DecompressionStream('deflate-raw'));
   const parts: Uint8Array[] = [];
   let size = 0;
+  const most = Math.min(MOST_INFLATED, mostUnpacked(bytes.length));
   for (const reader = stream.getReader(); ; ) {
     const { done, value } = await reader.read();
     if (done) break;
     size += value.length;
-    if (size > MOST_INFLATED) throw new Error('the compressed data set has more than 2 GB');
+    if (size > most) {
+      await reader.cancel();
+      throw new Error(inflatedProblem(bytes.length));
+    }
     parts.push(value);
   }
   const all = new Uint8Array(size);
@@ -179,4 +184,8 @@ export async function inflate(bytes: Uint8Array): Promise<Uint8Array> {
     at += part.length;
   }
   return all;
+}
+
+function inflatedProblem(stored: number): string {
+  return isSmall(stored) ? `it unpacks to too much; ${limitOfSmall()}` : 'the compressed data set has more than 2 GB';
 }

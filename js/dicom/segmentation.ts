@@ -2,7 +2,7 @@
 import type { VolumeInit } from '../data.js';
 import { withPause } from '../pause.js';
 import { listed } from './error.js';
-import { affineOf, distancesOf, shiftOf, smallest } from './geometry.js';
+import { affineOf, distancesOf, placementProblem, shiftOf, smallest } from './geometry.js';
 import { isAlike } from './grouping.js';
 import type { Parser } from './parser.js';
 import { arrayOf, PixelReader } from './pixels.js';
@@ -93,13 +93,16 @@ export class SegmentationVolume extends DicomVolume {
     if (problem !== undefined) return problem;
     const slices = slicesOf(images);
     if (!slices) return 'a segmentation with frames at uneven distances';
-    return shiftOf(slices.frames) ?? new SegmentationVolume(parser, slices);
+    const shift = shiftOf(slices.frames);
+    if (shift !== undefined) return shift;
+    const { frames, count } = slices;
+    const affine = affineOf(frames, count, Math.abs(frames[0]?.statedStep ?? 0) || 1);
+    return placementProblem(affine) ?? new SegmentationVolume(parser, slices, affine);
   }
 
-  private constructor(parser: Parser, slices: Slices) {
+  private constructor(parser: Parser, slices: Slices, affine: number[]) {
     const { frames, count } = slices;
     const [first] = frames as [Frame];
-    const affine = affineOf(frames, count, Math.abs(first.statedStep ?? 0) || 1);
     super(first.series, '', {
       dims: [first.format.columns, first.format.rows, count],
       spacing: spacingOf(affine),

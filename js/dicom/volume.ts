@@ -4,13 +4,14 @@ import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
 import { withPause } from '../pause.js';
 import { shortened } from '../short-text.js';
+import { STORE_PLAIN, unpackingProblem } from '../small-files.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import type { Warning } from '../warning.js';
 import type { Decoders } from './codecs.js';
 import { badDicom, listed } from './error.js';
 import { affineOf, distancesOf, evennessOf } from './geometry.js';
 import type { Stack } from './grouping.js';
-import type { Parser } from './parser.js';
+import { type Parser, PLAIN } from './parser.js';
 import { arrayOf, checkLength, PixelReader } from './pixels.js';
 import { secondsOf } from './time.js';
 import type { Frame, Segment, Series } from './types.js';
@@ -143,10 +144,6 @@ function remarksOn({ units, padding, inverted }: Series): string[] {
 
 export const reader = (text: string): Warning => ({ code: 'reader', text });
 
-/** Bytes that a volume may have, however few its files have, and for each byte of these. */
-const FREE_BYTES = 2 ** 29;
-const BYTES_PER_BYTE = 5000;
-
 /**
  * Returns an array of voxels; throws `bad-file` if frames lack bytes, `too-large` if there is no memory for it, or it is too
  * large for its files.
@@ -157,19 +154,24 @@ export function allocated(
   frames: readonly Frame[],
 ): VoxelArray {
   for (const frame of frames) checkLength(frame);
-  const stored = [...new Set(frames.map(({ file }) => file))].reduce((sum, { size }) => sum + size, 0);
+  const files = [...new Set(frames.map(({ file }) => file))];
+  const stored = files.reduce((sum, { size }) => sum + size, 0);
   const bytes = length * new Kind(0).BYTES_PER_ELEMENT;
-  if (bytes > Math.max(FREE_BYTES, BYTES_PER_BYTE * stored))
-    throw new VesicleError(
-      'too-large',
-      `DICOM: voxels: ${bytes} bytes are more than ${stored} bytes of files can hold`,
-    );
+  const problem = unpackingProblem(bytes, stored, frames.every(isPlain) ? ADD_SLICES : STORE_PLAIN);
+  const part = files.length === 1 ? shortened(files[0]?.name ?? '') : `${files.length} files`;
+  if (problem) throw new VesicleError('too-large', `DICOM: ${part}: ${problem}`);
   try {
     return new Kind(length);
   } catch {
     throw new VesicleError('too-large', `DICOM: voxels: no memory for ${length} voxels`);
   }
 }
+
+/** Advice about small files of which nothing is compressed: most of their slices have no image. */
+const ADD_SLICES = 'add the slices that have no image';
+
+/** Whether the voxels of an image are neither compressed themselves, nor with its file. */
+const isPlain = ({ deflated, format }: Frame) => !deflated && PLAIN.includes(format.transferSyntax);
 
 /** Lengths of the columns of an affine transform. */
 export const spacingOf = (affine: readonly number[]): Vec3 =>

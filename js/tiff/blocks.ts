@@ -1,7 +1,7 @@
 // Where the strips and tiles of a page are in its file.
 import { type Page, TAG } from './directory.js';
 import { badTiff } from './error.js';
-import type { Format } from './format.js';
+import { arrayOf, type Format } from './format.js';
 
 /** Largest number of bytes that are read at once, unless one block has more. */
 const READ_BYTES = 2 ** 22;
@@ -36,6 +36,12 @@ export function decodedBytes(format: Format): number {
   const { block, width, height } = format;
   const rows = block.isTile ? Math.ceil(height / block.height) * block.height : height;
   return Math.ceil(width / block.width) * rowBytes(format, block.width) * rows;
+}
+
+/** Returns the number of bytes of the numbers in these blocks, of which some have fewer bits in the file. */
+export function numberBytes(format: Format): number {
+  const bits = 8 * new (arrayOf(format.type))(0).BYTES_PER_ELEMENT;
+  return (decodedBytes(format) / format.type.bits) * bits;
 }
 
 /**

@@ -3,9 +3,10 @@ import { checkProperties, integer, invalid } from '../check.js';
 import type { LengthUnit, Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { type Pause, withPause } from '../pause.js';
 import { shortened } from '../short-text.js';
+import { isSmall, unpackingProblem } from '../small-files.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import type { Warning } from '../warning.js';
-import { decodedBytes } from './blocks.js';
+import { decodedBytes, numberBytes } from './blocks.js';
 import { badTiff, tooLarge } from './error.js';
 import { arrayOf, type Format, formatOf } from './format.js';
 import type { Channel, Layout } from './layout.js';
@@ -35,10 +36,6 @@ const LARGEST = 2 ** 32;
 
 /** Bytes that a small file may stand for, whatever its size. */
 const SMALL = 2 ** 16;
-
-/** Bytes that a volume may have, however few its files have, and for each byte of these. */
-const FREE_BYTES = 2 ** 29;
-const BYTES_PER_BYTE = 5000;
 
 /** Times that the bytes of a file may be read for a volume: some writers store equal tiles once. */
 const MOST_TIMES = 16;
@@ -135,18 +132,19 @@ export class TiffStack {
     const formats = new Map<Plane['page'], Format>();
     // Most pages are alike.
     const kinds = new Map<string, Format>();
-    let [bytes, ratio] = [0, 1];
+    let [bytes, unpacked, ratio] = [0, 0, 1];
     for (const { page } of this.#planes(channel)) {
       const known = formats.get(page);
       const format = known ?? shared(kinds, await formatOf(page));
       formats.set(page, format);
       if (!known) this.#checkAlike(page.label, format, formats.values().next().value ?? format);
       bytes += decodedBytes(format);
+      unpacked += numberBytes(format);
       ratio = Math.max(ratio, format.ratio);
       await pause.turn();
     }
     this.#checkSize(bytes, ratio);
-    this.#checkMemory(channel, formats);
+    this.#checkMemory(channel, formats, unpacked);
     return formats;
   }
 
@@ -168,19 +166,23 @@ export class TiffStack {
     throw tooLarge(name, `the images have ${Math.round(bytes)} bytes, more than ${size} bytes of files can hold`);
   }
 
-  /** Throws `too-large` if the voxels of small files take much memory, as those of masks without any object would. */
-  #checkMemory(channel: Channel, formats: Map<Plane['page'], Format>): void {
+  /**
+   * Throws `too-large` if the voxels take much memory for the size of the files, as those of masks without any object would.
+   * Small files count with all their channels, which are mostly read one after the other, and with all that is unpacked
+   * for one of them, `unpacked` bytes.
+   */
+  #checkMemory(channel: Channel, formats: Map<Plane['page'], Format>, unpacked: number): void {
     const [first] = formats.values();
     if (!first) return;
     const each = first.width * first.height * new (arrayOf(first.type))(0).BYTES_PER_ELEMENT;
     const isMixed = channel.planeAt(0, 0).part === 'luminance';
-    const bytes = each * (this.#layout.slices * this.frames + (isMixed ? WEIGHTS.length : 0));
+    const images = this.#layout.slices * this.frames;
     const size = this.#size();
-    if (bytes <= Math.max(FREE_BYTES, BYTES_PER_BYTE * size)) return;
-    throw tooLarge(
-      this.#sources[0]?.name ?? '',
-      `${bytes} bytes of voxels are more than ${size} bytes of files can hold`,
-    );
+    const channels = isSmall(size) ? this.#layout.channels.filter(({ missing }) => !missing).length : 1;
+    const voxels = each * (images * channels + (isMixed ? WEIGHTS.length : 0));
+    const bytes = isSmall(size) ? Math.max(voxels, unpacked) : voxels;
+    const problem = unpackingProblem(bytes, size);
+    if (problem) throw tooLarge(this.#sources[0]?.name ?? '', problem);
   }
 
   #size(): number {

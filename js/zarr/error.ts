@@ -6,6 +6,11 @@ export function badZarr(part: string, problem: string): VesicleError {
   return new VesicleError('bad-file', `OME-Zarr: ${part}: ${problem}`);
 }
 
+/** Returns the `too-large` error about a part of the data; the caller throws it. */
+export function tooLarge(part: string, problem: string): VesicleError {
+  return new VesicleError('too-large', `OME-Zarr: ${part}: ${problem}`);
+}
+
 /** Formats a value of the metadata for an error message. */
 export function shown(value: unknown): string {
   const text = JSON.stringify(value) ?? 'nothing';

@@ -57,7 +57,7 @@ const CACHE_BYTES = 256e6;
  *
  * @param source - An address, a store, a folder or its files, or a ZIP; see {@link ZarrSource}.
  * @throws `VesicleError` `bad-file`: no image, or metadata that is inconsistent or not supported; `unavailable`: a
- *   request that failed; `invalid-argument` naming the option; `too-large`: chunks that do not fit into memory.
+ *   request that failed; `invalid-argument` naming the option; `too-large`: chunks or sizes that do not fit into memory.
  *   `signal.reason` when aborted.
  */
 export async function openZarr(source: ZarrSource, given?: ZarrOptions): Promise<ZarrVolume> {

@@ -2,10 +2,9 @@
 import type { Array as ZarrArray } from 'zarrita';
 import { integer, invalid } from '../check.js';
 import type { Vec3, VoxelArray } from '../data.js';
-import { VesicleError } from '../error.js';
 import { Abandoned, type Brick } from './cache.js';
 import { withSlack } from './codecs.js';
-import { badZarr, shown, translated, type Zarrita } from './error.js';
+import { badZarr, shown, tooLarge, translated, type Zarrita } from './error.js';
 import type { AxisName, LevelTransform, Multiscale } from './multiscales.js';
 import { type FileOptions, NotStored, Slots } from './requests.js';
 import type { ZarrLevel, ZarrVoxelType } from './types.js';
@@ -226,13 +225,22 @@ export function checkSeries(arrays: readonly ZarrArray<'uint8'>[], { axes, level
 }
 
 function checkSizes({ shape, chunks }: ZarrArray<'uint8'>, axes: AxisName[], part: string): void {
-  const isCounts = (values: unknown, most: number) =>
-    Array.isArray(values) &&
-    values.length === axes.length &&
-    values.every((size) => Number.isInteger(size) && size >= 1 && size <= most);
-  const wanted = `must be ${axes.length} whole numbers above 0, one for each axis`;
-  if (!isCounts(shape, MOST_VOXELS)) throw badZarr(`${part}.shape`, `${wanted}, got ${shown(shape)}`);
-  if (!isCounts(chunks, MOST_VOXELS)) throw badZarr(`${part}.chunk_shape`, `${wanted}, got ${shown(chunks)}`);
+  for (const [name, sizes] of Object.entries({ shape, chunk_shape: chunks })) {
+    const isCounts =
+      Array.isArray(sizes) &&
+      sizes.length === axes.length &&
+      sizes.every((size) => Number.isInteger(size) && size >= 1);
+    if (!isCounts)
+      throw badZarr(
+        `${part}.${name}`,
+        `must be ${axes.length} whole numbers above 0, one for each axis, got ${shown(sizes)}`,
+      );
+    if (sizes.some((size) => size > MOST_VOXELS))
+      throw tooLarge(
+        `${part}.${name}`,
+        `at most ${MOST_VOXELS} voxels along each axis can be read, got ${shown(sizes)}`,
+      );
+  }
 }
 
 /** Returns the number of bytes of a chunk as zarrita decodes it; throws `too-large` for one that does not fit. */
@@ -240,9 +248,9 @@ function chunkBytes({ chunks, dtype }: ZarrArray<'uint8'>, part: string): number
   const size = Number(/\d+$/.exec(dtype)?.[0]) / 8;
   const bytes = chunks.reduce((product, size) => product * size, size);
   if (bytes <= LARGEST_CHUNK) return bytes;
-  throw new VesicleError(
-    'too-large',
-    `OME-Zarr: ${part}: chunks of ${shown(chunks)} voxels of ${size} bytes; at most ${LARGEST_CHUNK} bytes can be read`,
+  throw tooLarge(
+    part,
+    `chunks of ${shown(chunks)} voxels of ${size} bytes; at most ${LARGEST_CHUNK} bytes can be read`,
   );
 }
 

@@ -31,8 +31,16 @@ export class HttpError extends Error {
 
 type Key = `/${string}`;
 
-/** Most bytes of a file of metadata. */
-const MOST_METADATA = 2 ** 26;
+/**
+ * Most bytes of all metadata that are read of an image: its group, and its arrays. A level has up to two thousand, a channel
+ * 300, the wells of a plate of 1536, written with indentation, 230,000. The colours of labels are the longest, 50 to 150
+ * bytes each: those of 28,000 labels fit in any case. Parsing this many bytes takes half a second, in which nothing else
+ * happens.
+ */
+const MOST_METADATA = 2 ** 22;
+
+/** Most brackets within brackets in metadata; images have a dozen. */
+const MOST_NESTED = 200;
 
 /** How a file is asked for. Stores get the same, and heed what they know. */
 export interface FileOptions extends GetOptions {
@@ -57,6 +65,8 @@ export class Requests implements AsyncReadable {
   readonly #store: Readable;
   readonly #options: RequestOptions;
   readonly #slots: Slots;
+  /** Bytes of metadata so far. */
+  #metadata = 0;
   /** Files that had to exist and did not. */
   readonly #missing = new Set<Key>();
 
@@ -72,7 +82,16 @@ export class Requests implements AsyncReadable {
     const options = (signal: AbortSignal): FileOptions => ({ signal, mostBytes });
     const bytes = await this.#existing(key, given, async (signal) => this.#store.get(key, options(signal)));
     checkLength(key, bytes?.length ?? 0, mostBytes);
+    if (bytes && given.mostBytes === undefined) this.#checkMetadata(key, bytes);
     return bytes;
+  }
+
+  /** Throws `bad-file` for metadata that would take long to parse. */
+  #checkMetadata(key: string, bytes: Uint8Array): void {
+    this.#metadata += bytes.length;
+    if (this.#metadata > MOST_METADATA)
+      throw badZarr(key, `with it, the metadata of the image have more than ${MOST_METADATA} bytes, which is the most`);
+    if (isNestedDeeply(bytes)) throw badZarr(key, `brackets are nested more than ${MOST_NESTED} deep`);
   }
 
   async #getRange(key: Key, range: RangeQuery, given: FileOptions = {}): Promise<Uint8Array | undefined> {
@@ -122,6 +141,24 @@ export class Requests implements AsyncReadable {
       await pause(FIRST_PAUSE_MS * 2 ** attempt, signal);
     }
   }
+}
+
+/** Returns whether brackets of JSON are nested too deeply to be parsed in little time. */
+function isNestedDeeply(json: Uint8Array): boolean {
+  const [quote, backslash] = [0x22, 0x5c];
+  let [depth, isText] = [0, false];
+  for (let at = 0; at < json.length; at++) {
+    const byte = json[at] as number;
+    if (isText) {
+      if (byte === backslash) at += 1;
+      else if (byte === quote) isText = false;
+    } else if (byte === quote) isText = true;
+    // { and [, which differ in one bit, as } and ] do.
+    else if ((byte | 0x20) === 0x7b) depth += 1;
+    else if ((byte | 0x20) === 0x7d) depth -= 1;
+    if (depth > MOST_NESTED) return true;
+  }
+  return false;
 }
 
 /** Throws `bad-file` for a range from a damaged index of a shard. */

@@ -96,6 +96,11 @@ test('settings that a link contains are read as they were', () => {
   fc.assert(fc.property(linked, read), { numRuns });
 });
 
+test('a link of too many characters is refused', () => {
+  const hash = `#extract?${'p.iso=1&'.repeat(12_000)}v=2`;
+  expect(() => extract.fromHash(hash)).toThrow('A link has at most 30,000 characters, this one 96,003.');
+});
+
 test('a link with more attractors than any that the app makes is refused', () => {
   const hash = `#extract?v=2${'&attractor=1,2,3,4,5'.repeat(101)}`;
   expect(() => extract.fromHash(hash)).toThrow('at most 100 of “attractor”, this one 101');

@@ -270,6 +270,14 @@ test('any subset of parameters can be set, all or nothing', () => {
   }
 });
 
+test('numbers of very many digits have an exponent in messages', () => {
+  const message = (rigidity: number) => failure(() => model().setParams({ rigidity })).message;
+  expect(message(1e308)).toBe('rigidity: must be a number from 0 to 3, got 1e+308');
+  expect(message(-1.5e30)).toMatch(/got -1.5e\+30$/);
+  expect(message(-1e-300)).toMatch(/got -1e-300$/);
+  expect(message(123_456.75)).toMatch(/got 123456.75$/);
+});
+
 test('specs describe every parameter, with its default', () => {
   const specs = paramSpecs('deformable');
   const defaults: Record<string, unknown> = new DeformableModel({ volume }).params;

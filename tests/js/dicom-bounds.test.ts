@@ -86,7 +86,7 @@ const fragments = (parts: Buffer[], stated?: number): Element => ({
 });
 const refused = async (element: Element, size: Image, uid: string) => {
   const files = [0, 1].map((z) => {
-    const more = [element, textElement('00080018', 'UI', `1.${z}`)];
+    const more = [element, textElement('00080018', 'UI', `1.${z}`), ...(size.more ?? [])];
     return file(image({ ...size, position: `0\\0\\${z}`, more }), z, uid);
   });
   const error = await within(2, () => rejection(readDicom(files)));
@@ -152,6 +152,14 @@ describe('files of very many', () => {
     expect(reasons(await within(3, () => openDicom(bomb)))[0]).toMatch(/more elements than a file of its size/);
     const zeros = deflated(image({ rows: 60_000, columns: 6000, bits: 1, frames: 2, pixels: Buffer.alloc(1e7) }));
     expect(reasons(await openDicom(zeros))[0]).toMatch(/2 images need 90000000 bytes, it has 10000000/);
+    const much = deflated(image({ rows: 6000, columns: 6000, pixels: Buffer.alloc(36e6) }));
+    expect(reasons(await within(2, () => openDicom(much)))[0]).toMatch(
+      /unpacks to too much; files of up to 128 KiB may unpack to 32 MiB: store the images uncompressed$/,
+    );
+    const cut = deflated(image({ more: [{ tag: '00081140', vr: 'OB', value: Buffer.alloc(2), length: 1e6 }] }));
+    expect(reasons(await openDicom(cut))[0]).toMatch(
+      /could not be read: it is cut off, or states a length beyond its end$/,
+    );
   });
 
   test('digits, or signs that separate names', async () => {
@@ -240,14 +248,26 @@ describe('values are those of the file', () => {
   });
 });
 
+test('slices or pixels at a distance that no volume has are skipped', async () => {
+  const slices = (far: string, more: Element[] = []) =>
+    [`0\\0\\0`, `0\\0\\${far}`].map((position, z) =>
+      file(image({ position, more: [textElement('00080018', 'UI', `1.${z}`), ...more] }), z),
+    );
+  const refusal = async (far: string, more?: Element[]) => (await rejection(readDicom(slices(far, more)))).message;
+  expect(await refusal('1e13')).toMatch(/slices are 10000000000000 mm apart, which cannot be \(2 files\)/);
+  expect(await refusal('1', [textElement('00280030', 'DS', '1\\1e-13')])).toMatch(/pixels are 1e-13 mm apart/);
+});
+
 describe('compressed images', () => {
   test('with fragments longer than their file', async () => {
     const text = await refused(fragments([Buffer.alloc(80), Buffer.alloc(80)], 0xfffffff0), {}, RLE);
-    expect(text).toMatch(/^bad-file DICOM: file 0: could not be read: .*overrun/);
+    expect(text).toMatch(
+      /^bad-file DICOM: file 0: could not be read: it is cut off, or states a length beyond its end$/,
+    );
   });
 
   test('that cannot hold so many voxels', async () => {
-    const large = { rows: 5000, columns: 4000 };
+    const large = { rows: 5000, columns: 4000, more: [long('00204000', ' '.repeat(2 ** 17))] };
     expect(await refused(fragments([Buffer.alloc(80)]), large, RLE)).toMatch(
       /voxels are more than 80 compressed bytes/,
     );
@@ -364,7 +384,14 @@ describe('segmentations', () => {
     const error = await within(2, () =>
       rejection(readDicom(segmentation(frames, { rows: 150, columns: 150 }, [step]))),
     );
-    expect([error.code, error.message]).toEqual(['too-large', expect.stringMatching(/1350022500 bytes are more than/)]);
+    const reason = /^DICOM: file 0: would unpack to 1287.5 MiB .* 32 MiB: add the slices that have no image$/;
+    expect([error.code, error.message]).toEqual(['too-large', expect.stringMatching(reason)]);
+  });
+
+  test('of slices at a distance that no volume has are skipped', async () => {
+    const far = ['0\\0\\0', '0\\0\\1e12'].map((position) => ({ position, segment: 1 }));
+    const error = await rejection(readDicom(segmentation(far, {}, [textElement('00180088', 'DS', '0')])));
+    expect(`${error.code} ${error.message}`).toMatch(/^bad-file .*slices are 1000000000000 mm apart, which cannot be/);
   });
 
   test('with names of any characters and any length, of which the first of a number counts', async () => {

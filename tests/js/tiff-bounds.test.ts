@@ -41,6 +41,8 @@ async function within<Result>(most: number, work: () => Promise<Result>): Promis
 }
 
 const zeros = (count: number) => new Uint8Array(count);
+/** Bytes that make a file larger than small ones, which have bounds of their own. */
+const padding = zeros(2 ** 17);
 const lzw = COMPRESS[5] as (bytes: Uint8Array) => Uint8Array;
 
 /** Returns tags of strips of one row each that have the same bytes. */
@@ -108,7 +110,7 @@ describe('small files of large images', () => {
   test('numbers of few bits are unpacked in little time', async () => {
     const packed = lzw(zeros(12e6));
     const { data } = await within(4, () =>
-      readTiff(file([packed], page({ 256: 32_000, 257: 3000, 258: 1, 259: 5, 279: packed.length }))),
+      readTiff(file([packed, padding], page({ 256: 32_000, 257: 3000, 258: 1, 259: 5, 279: packed.length }))),
     );
     expect(data).toHaveLength(96e6);
   });
@@ -132,11 +134,45 @@ describe('small files of large images', () => {
   test('are refused before memory is allocated', async () => {
     const packed = lzw(zeros(1e8));
     const bits = page({ 256: 32_000, 257: 25_000, 258: 1, 259: 5, 279: packed.length });
-    expect(await within(2, () => refusal(file([packed], bits)))).toMatch(/^too-large: .*800000000 bytes of voxels/);
+    expect(await within(2, () => refusal(file([packed, padding.subarray(packed.length)], bits)))).toMatch(
+      /^too-large: .*800000000 bytes of voxels/,
+    );
     const frame = [0x28, 0xb5, 0x2f, 0xfd, 0xa0, 0, 0x65, 0xcd, 0x1d];
     for (let k = 0; k < 3815; k++) frame.push(k === 3814 ? 3 : 2, 0xff, 0x0f, 0);
     const zstandard = page({ 256: 20_000, 257: 25_000, 259: 50_000, 279: frame.length });
-    expect(await within(2, () => refusal(file([Uint8Array.from(frame)], zstandard)))).toMatch(/Zstandard are too many/);
+    expect(await within(2, () => refusal(file([Uint8Array.from(frame), padding], zstandard)))).toMatch(
+      /Zstandard are too many/,
+    );
+  });
+
+  test('that are at most 128 KiB may unpack to 32 MiB, all channels, pages and frames together', async () => {
+    const strip = (rows: number, tags: Tags = {}) => {
+      const data = lzw(zeros(4096 * rows));
+      return [data, page({ 256: 4096, 257: rows, 259: 5, 279: data.length, ...tags })] as const;
+    };
+    const most =
+      /^too-large: TIFF: x.tif: would unpack to 32.1 MiB of voxels; .*up to 128 KiB .* 32 MiB: store the images/;
+    const [all, one] = strip(8192);
+    expect((await readTiff(file([all], one))).data).toHaveLength(2 ** 25);
+    const [more, larger] = strip(8193);
+    expect(await within(1, () => refusal(file([more], larger)))).toMatch(most);
+    expect((await readTiff(file([more, padding], larger))).data).toHaveLength(4096 * 8193);
+    const [half, slice] = strip(4097);
+    const [, other] = strip(4097, { 273: START + half.length });
+    expect(await within(1, () => refusal(file([half, half], slice, other)))).toMatch(most);
+    const description = `<OME><Image><Pixels SizeC="2"><TiffData/></Pixels></Image></OME>`;
+    const [, first] = strip(4097, { 270: { tag: 270, type: 2, values: text(description) } });
+    for (const channel of [0, 1])
+      expect(await within(1, () => refusal(file([half], first, slice), channel))).toMatch(most);
+    const tile = file(
+      [lzw(zeros(5e6))],
+      [
+        ...page({ 259: 5, 258: 1, 322: 8192, 323: 4104, 324: START, 325: 4000 }).filter(
+          ({ tag }) => tag !== 273 && tag !== 279,
+        ),
+      ],
+    );
+    expect(await within(1, () => refusal(tile))).toMatch(most);
   });
 
   test('of several with very many channels each', async () => {

@@ -138,8 +138,45 @@ describe('an image whose metadata promise much', () => {
   test('files longer than they may be', async () => {
     const large = withChunk(CUBE, zeros(1e6));
     expect((await rejection(openZarr(large))).message).toMatch(/larger than the \d+ bytes that it may have/);
-    const store = new TestStore(image(CUBE).set('/zarr.json', zeros(2 ** 26 + 1)));
+    const store = new TestStore(image(CUBE).set('/zarr.json', zeros(2 ** 22 + 1)));
     expect((await rejection(openZarr(store))).message).toContain('/zarr.json');
+  });
+
+  const withAttributes = (path: string, attributes: string, files = image(CUBE)) => {
+    const text = new TextDecoder().decode(files.get(path)).replace('"attributes":{', `"attributes":{${attributes},`);
+    return files.set(path, new TextEncoder().encode(text.replace(',}', '}')));
+  };
+
+  test('files of metadata that are longer together', async () => {
+    const one = withAttributes('/zarr.json', `"a":"${'x'.repeat(2.2e6)}"`);
+    expect((await openZarr(new TestStore(new Map(one)))).levels).toHaveLength(1);
+    const both = new TestStore(withAttributes('/0/zarr.json', `"a":"${'x'.repeat(2.2e6)}"`, one));
+    const error = await rejection(openZarr(both));
+    expect(`${error.code} ${error.message}`).toMatch(/^bad-file .*\/0\/zarr.json: with it, .* more than 4194304 bytes/);
+  });
+
+  test('brackets within brackets, unless they are text', async () => {
+    const text = `"a":"${'['.repeat(2e6)}\\"${'{'.repeat(1000)}","b":[${'[{}],'.repeat(1000)}[]]`;
+    expect((await openZarr(new TestStore(withAttributes('/zarr.json', text)))).levels).toHaveLength(1);
+    const deep = withAttributes('/zarr.json', `"a":${'['.repeat(2e6)}${']'.repeat(2e6)}`);
+    const before = performance.now();
+    const error = await rejection(openZarr(new TestStore(deep)));
+    expect(`${error.code} ${error.message}`).toMatch(/^bad-file .*\/zarr.json: brackets are nested more than 200 deep/);
+    expect(performance.now() - before).toBeLessThan(300);
+  });
+
+  test('sizes beyond 32 bits', async () => {
+    const beyond = async (shape: number[], chunks: number[]) => {
+      const error = await rejection(openZarr(new TestStore(image({ shape, chunks }))));
+      return `${error.code} ${error.message}`;
+    };
+    const problem = 'at most 4294967295 voxels along each axis can be read, got';
+    expect(await beyond([8, 8, 1e10], [8, 8, 8])).toBe(
+      `too-large OME-Zarr: array "0".shape: ${problem} [8,8,10000000000]`,
+    );
+    expect(await beyond([8, 8, 8], [1e10, 8, 8])).toBe(
+      `too-large OME-Zarr: array "0".chunk_shape: ${problem} [10000000000,8,8]`,
+    );
   });
 });
 

@@ -243,7 +243,6 @@ describe('metadata that lies', () => {
     ['negative shape', 'shape', [14, -22, 26], /array "s0".shape/],
     ['fraction', 'shape', [14, 22.5, 26], /array "s0".shape/],
     ['shape as text', 'shape', '14,22,26', /array "s0"/],
-    ['shape beyond 32 bits', 'shape', [14, 22, 1e10], /array "s0".shape/],
     ['chunk of nothing', chunkShape, [6, 0, 11], /array "s0".chunk_shape/],
     ['chunk axes', chunkShape, [6, 9], /array "s0"/],
     ['no chunks', 'chunk_grid', undefined, /array "s0": cannot be read/],

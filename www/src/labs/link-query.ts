@@ -3,7 +3,7 @@
  * the page busy.
  */
 import type { ParamValues } from '../protocol';
-import { text } from '../texts';
+import { count, text } from '../texts';
 
 /** Most characters of a link's settings. Browsers and other programs cut off longer addresses. */
 const MOST_CHARACTERS = 30_000;
@@ -29,6 +29,9 @@ function tooMany(name: string, most: number, found: number): LinkError {
   return new LinkError(text('labs.linkTooMuch', { name, most, found }));
 }
 
+const tooLong = (found: number) =>
+  new LinkError(text('labs.linkTooLong', { most: count(MOST_CHARACTERS), found: count(found) }));
+
 /**
  * Returns the settings of a lab in the hash of an address; undefined if it is for another lab or contains no settings.
  * Throws a {@link LinkError} if they are too long.
@@ -36,7 +39,7 @@ function tooMany(name: string, most: number, found: number): LinkError {
 export function queryOf(hash: string, lab: string): URLSearchParams | undefined {
   const [address, settings] = hash.split(/\?(.*)/s, 2);
   if (address !== lab || !settings) return undefined;
-  if (settings.length > MOST_CHARACTERS) throw tooMany(text('labs.linkCharacters'), MOST_CHARACTERS, settings.length);
+  if (settings.length > MOST_CHARACTERS) throw tooLong(settings.length);
   return new URLSearchParams(settings);
 }
 

@@ -1,0 +1,38 @@
+// How much files may unpack to: a few kilobytes can stand for gigabytes of equal voxels, and methods take many times that.
+
+/** Bytes of files that are small, all together, and the most bytes that they may unpack to. */
+const SMALL = 2 ** 17;
+const MOST_OF_SMALL = 2 ** 25;
+
+/** Most bytes that a byte of larger files may unpack to. */
+const RATIO = 5000;
+
+/** Returns whether files are small that have `stored` bytes, all together. */
+export const isSmall = (stored: number): boolean => stored <= SMALL;
+
+/** Returns the most bytes that files of `stored` bytes, all together, may unpack to. */
+export function mostUnpacked(stored: number): number {
+  return isSmall(stored) ? MOST_OF_SMALL : RATIO * stored;
+}
+
+/** Advice about small files of compressed images. */
+export const STORE_PLAIN = 'store the images uncompressed';
+
+/**
+ * Returns why files of `stored` bytes may not unpack to `bytes`, undefined if they may.
+ *
+ * @param help - Advice about small files, as an order.
+ */
+export function unpackingProblem(bytes: number, stored: number, help = STORE_PLAIN): string | undefined {
+  if (bytes <= mostUnpacked(stored)) return undefined;
+  if (!isSmall(stored)) return `${bytes} bytes of voxels are more than ${stored} bytes of files can hold`;
+  return `would unpack to ${mebibytes(bytes)} MiB of voxels; ${limitOfSmall(help)}`;
+}
+
+/** Returns the limit of small files in words, with what helps. */
+export function limitOfSmall(help = STORE_PLAIN): string {
+  return `files of up to ${SMALL / 2 ** 10} KiB may unpack to ${MOST_OF_SMALL / 2 ** 20} MiB: ${help}`;
+}
+
+/** Returns a number of bytes in MiB, rounded up to a tenth. */
+const mebibytes = (bytes: number) => Math.ceil((bytes / 2 ** 20) * 10) / 10;
