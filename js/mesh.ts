@@ -112,8 +112,10 @@ export interface MeshReport {
    */
   selfIntersections: number;
   /**
-   * Present, and true, if there are more self-intersections than were counted: that ends at 100,000, or where so many
-   * triangles lie on each other that it would take minutes.
+   * Present, and true, if not all pairs of triangles were tested, so that there may be more self-intersections than were
+   * counted, also where `selfIntersections` is 0. The search ends at 100,000, and after 20 million pairs of triangles near
+   * each other, or 60 for each triangle: where many lie on each other, or thousands meet in a vertex, more would take
+   * minutes.
    */
   hasMore?: true;
 }
@@ -251,7 +253,7 @@ export class Mesh {
   /**
    * Creates a sphere of nearly equilateral triangles with no edge longer than `maxEdge`.
    *
-   * @throws {@link VesicleError} `invalid-argument`; `too-large` for more triangles than there is memory for.
+   * @throws {@link VesicleError} `invalid-argument`; `too-large` for more than four million vertices.
    */
   static icosphere(center: Vec3, radius: number, maxEdge: number): Mesh {
     const middle = vec3('center', center);
@@ -468,7 +470,7 @@ export class Mesh {
    * Refines the mesh by one pass of √3 subdivision, which replaces each triangle by three.
    *
    * @throws {@link VesicleError} `not-closed`; `invalid-argument` for the mesh of a model: `clone()` it first;
-   *   `too-large`.
+   *   `too-large` for more than four million vertices.
    */
   refine(): void {
     this.#handle.use((raw) => raw.refine());
@@ -483,7 +485,7 @@ export class Mesh {
    * @param passes - The passes in order; default each of the three once.
    * @returns The number of edges collapsed, split or flipped.
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first;
-   *   `too-large`.
+   *   `too-large` where more than four million vertices would be needed. The mesh is then unchanged.
    */
   restructure(edge: { min: number; max: number }, passes: readonly RestructurePass[] = RESTRUCTURE_PASSES): number {
     const [min, max] = edgeBounds(edge);
@@ -540,7 +542,7 @@ export class Mesh {
    *
    * @param edge - Bounds of edge lengths, world units: `min` above 0, `max` more than twice `min`.
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first;
-   *   `too-large` where more than eight million vertices would be needed; `precision` where `max` is below 64 times the
+   *   `too-large` where more than four million vertices would be needed; `precision` where `max` is below 64 times the
    *   spacing of single-precision numbers at the largest coordinate.
    */
   remesh(edge: { min: number; max: number }): void {

@@ -29,9 +29,12 @@ impl Failure {
         Self::new("invalid-argument", format!("{parameter}: {problem}"))
     }
 
-    /// Creates a `too-large` failure: `bytes` bytes of memory are needed, more than is available.
+    /// Creates a `too-large` failure: `bytes` bytes of memory are needed, more than are left.
     pub fn too_large(bytes: u64) -> Self {
-        Self::new("too-large", format!("{bytes} bytes are needed, more than is available"))
+        Self::new(
+            "too-large",
+            format!("{bytes} bytes are needed, more than is left of the 4 GiB of WebAssembly"),
+        )
     }
 }
 
@@ -54,7 +57,7 @@ impl From<MeshError> for Failure {
             MeshError::SelfIntersecting { .. } | MeshError::CannotCut => "self-intersecting",
             MeshError::Precision { .. } => "precision",
             MeshError::NoProgress { .. } => "no-progress",
-            MeshError::TooLarge { .. } => "too-large",
+            MeshError::TooManyVertices { .. } | MeshError::TooLarge { .. } => "too-large",
         };
         Self::new(code, error.to_string())
     }

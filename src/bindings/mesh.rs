@@ -21,9 +21,7 @@ use vesicle::mesh::{
     world_origin,
 };
 use vesicle::methods::LiveSurface;
-use vesicle::remesh::{
-    Changes, EdgeBounds, Unchecked, collapse_short, decimate, flip_for_valence, remesh, split_long,
-};
+use vesicle::remesh::{EdgeBounds, RestructurePass, decimate, remesh, restructure_in_passes};
 use vesicle::spatial::{SurfaceDistance, SurfacePoint, TriangleTree, cross_section, surface_distance};
 use vesicle::volume::marching_cubes_world;
 
@@ -222,21 +220,16 @@ impl RawMesh {
 
     /// Runs passes of restructuring in the given order: collapses of edges shorter than `min` (0), splits of edges
     /// longer than `max` (1), flips (2); both bounds are in world units. Returns the number of edits; see
-    /// [`restructure`].
-    ///
-    /// [`restructure`]: vesicle::remesh::restructure
+    /// [`restructure_in_passes`].
     pub fn restructure(&mut self, min: f64, max: f64, passes: &[u8]) -> Result<u32, JsValue> {
         let bounds = EdgeBounds { min: min as f32, max: max as f32 };
-        let mesh = self.editable()?;
-        bounds.check_for(mesh).map_err(Failure::from)?;
-        let mut changes = Changes::default();
-        for pass in passes {
-            changes += match pass {
-                0 => collapse_short(mesh, bounds, &mut Unchecked),
-                1 => split_long(mesh, bounds, usize::MAX, &mut Unchecked),
-                _ => flip_for_valence(mesh, bounds, &mut Unchecked),
-            };
-        }
+        let pass = |code: &u8| match code {
+            0 => RestructurePass::Collapse,
+            1 => RestructurePass::Split,
+            _ => RestructurePass::Flip,
+        };
+        let passes: Vec<_> = passes.iter().map(pass).collect();
+        let changes = restructure_in_passes(self.editable()?, bounds, &passes).map_err(Failure::from)?;
         Ok(changes.creations + changes.deletions + changes.inversions)
     }
 

@@ -40,7 +40,9 @@ pub enum FormatError {
         found: u64,
     },
     /// The content does not fit in memory, or exceeds a limit of the reader.
-    #[error("{format}: {field}: needs {needed} bytes, more than is available")]
+    #[error(
+        "{format}: {field}: needs {needed} bytes, more than a reader may take, or is left of the 4 GiB of WebAssembly"
+    )]
     TooLarge {
         /// Name of the file format.
         format: &'static str,

@@ -1,7 +1,7 @@
 //! Construction of meshes from triangle lists and simple shapes, and conversion back to triangle lists.
 
 use super::attributes::Attributes;
-use super::{Mesh, MeshError, Ring, TriangleMesh, VertexId};
+use super::{MAX_VERTICES, Mesh, MeshError, Ring, TriangleMesh, VertexId};
 use crate::math::Vec3;
 
 /// The largest valence accepted by [`Mesh::from_triangles`]; rings are searched linearly, so that edits around a vertex
@@ -59,7 +59,7 @@ impl Mesh {
     ///
     /// # Errors
     /// [`MeshError::InvalidArgument`] unless the centre is finite and radius and edge are positive and finite;
-    /// [`MeshError::TooLarge`] if more than about 16 million vertices would be needed.
+    /// [`MeshError::TooManyVertices`] if more than [`MAX_VERTICES`] would be needed.
     pub fn icosphere(center: Vec3, radius: f32, max_edge: f32) -> Result<Self, MeshError> {
         positive("radius", radius)?;
         positive("maxEdge", max_edge)?;
@@ -69,10 +69,13 @@ impl Mesh {
         }
         let mut mesh = Self::icosahedron(Vec3::ZERO, 1.0);
         let limit = max_edge / radius;
+        let square = f64::from(limit) * f64::from(limit);
+        // Saturates beyond the range.
+        let least = (SPHERE_VERTICES / square) as u64;
+        if least > MAX_VERTICES as u64 {
+            return Err(MeshError::TooManyVertices { vertices: least });
+        }
         while mesh.longest_edge() > limit {
-            if mesh.vertex_count() > MAX_SPHERE_VERTICES / 3 {
-                return Err(MeshError::TooLarge { bytes: 3 * mesh.vertex_count() as u64 * 64 });
-            }
             mesh.refine()?;
             mesh.positions.iter_mut().for_each(|p| *p = p.normalize_or(Vec3::X));
         }
@@ -106,11 +109,9 @@ impl Mesh {
     /// are unspecified, and the caller sets them.
     ///
     /// # Errors
-    /// [`MeshError::TooLarge`] if there are not enough vertex ids left.
+    /// [`MeshError::TooManyVertices`] if both have more than [`MAX_VERTICES`] together.
     pub fn append(&mut self, other: &Self) -> Result<Vec<VertexId>, MeshError> {
-        if !self.has_ids_for(other.vertex_count()) {
-            return Err(MeshError::TooLarge { bytes: 64 * other.vertex_count() as u64 });
-        }
+        self.check_room(other.vertex_count())?;
         let mut new_ids = vec![NO_ID; other.slots()];
         for v in other.vertices() {
             new_ids[v.index()] = self.allocate(other.position(v));
@@ -130,9 +131,8 @@ impl Mesh {
 /// Placeholder in [`Mesh::append`] for the new id of a free slot, as only live vertices are copied.
 const NO_ID: VertexId = VertexId(u32::MAX);
 
-/// The largest vertex count of a sphere made by [`Mesh::icosphere`]: as many as fit into a browser's memory with room
-/// to work.
-const MAX_SPHERE_VERTICES: usize = 16_000_000;
+/// The number of vertices of a sphere of radius 1 with equilateral triangles, times their squared edge length: 8 π / √3.
+const SPHERE_VERTICES: f64 = 14.51;
 
 fn positive(parameter: &'static str, value: f32) -> Result<(), MeshError> {
     if value.is_finite() && value > 0.0 {

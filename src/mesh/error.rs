@@ -1,6 +1,6 @@
 //! Errors of building a mesh and of editing it.
 
-use super::VertexId;
+use super::{MAX_VERTICES, VertexId};
 
 /// An error of building or validating a mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -43,10 +43,18 @@ pub enum MeshError {
         /// The work that did not progress, and what may help, as text for the user.
         problem: String,
     },
-    /// The mesh needs more memory, or more vertices, than are available.
-    #[error("the mesh needs {bytes} bytes, more than is available")]
+    /// The mesh would have more vertices than [`MAX_VERTICES`].
+    #[error(
+        "the mesh would have about {vertices} vertices, and at most {MAX_VERTICES} are possible, so that there is memory left to work with it"
+    )]
+    TooManyVertices {
+        /// The number of vertices that would be needed, estimated where it is not known in advance.
+        vertices: u64,
+    },
+    /// A file of the mesh needs more memory than is left, or would exceed 4 GiB.
+    #[error("the mesh needs {bytes} bytes, more than is left of the 4 GiB of WebAssembly")]
     TooLarge {
-        /// The memory required, in bytes, estimated from the number of vertices.
+        /// The memory required, in bytes.
         bytes: u64,
     },
 }

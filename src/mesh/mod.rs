@@ -35,6 +35,7 @@ mod ring;
 mod self_intersections;
 #[cfg(test)]
 pub(crate) mod shapes;
+mod size;
 mod surgery;
 mod texture;
 mod transform;
@@ -60,6 +61,7 @@ pub use report::{MeshReport, report};
 pub use ring::Ring;
 pub(crate) use self_intersections::intersecting_parts;
 pub use self_intersections::{Facet, count_self_intersections, facets_intersect, intersecting_pairs};
+pub use size::MAX_VERTICES;
 pub use surgery::{Cut, TubeRims};
 pub use texture::{ImageKind, Texture};
 pub use transform::invertible_map;

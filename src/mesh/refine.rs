@@ -9,13 +9,10 @@ impl Mesh {
     /// vertices do not move. Edge lengths are divided by about √3, and the number of vertices is about tripled.
     ///
     /// # Errors
-    /// [`MeshError::TooLarge`] if the result would have more vertices than there are ids.
+    /// [`MeshError::TooManyVertices`] if the result would have more than [`MAX_VERTICES`](super::MAX_VERTICES).
     pub fn refine(&mut self) -> Result<(), MeshError> {
+        self.check_room(self.triangle_count())?;
         let old = self.slots();
-        if !self.has_ids_for(self.triangle_count()) {
-            let bytes = (self.triangle_count() as u64).saturating_mul(std::mem::size_of::<Ring>() as u64);
-            return Err(MeshError::TooLarge { bytes });
-        }
         // New vertices are appended, so that the old rings stay readable while the new ones are built.
         let before = std::mem::take(&mut self.rings);
         let mut points = FacePoints::new(&before);

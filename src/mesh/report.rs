@@ -25,8 +25,9 @@ pub struct MeshReport {
     /// The number of pairs of triangles that intersect beyond their common corners and edges, tested exactly; see
     /// [`intersecting_pairs`](super::intersecting_pairs).
     pub self_intersections: usize,
-    /// Whether there are more self-intersections than were counted: that ends at 100,000, or where so many triangles lie
-    /// on each other that it would take minutes.
+    /// Whether the search for self-intersections was cut short, so that there may be more than were counted, even if none
+    /// was found. It ends at 100,000, and after 20 million pairs of triangles whose boxes overlap, or 60 for each triangle:
+    /// where many lie on each other, or thousands meet in a vertex, more would take minutes.
     pub has_more: bool,
 }
 
@@ -127,6 +128,7 @@ fn is_path_or_cycle(link: &[LinkEdge]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::intersecting_pairs;
+    use super::super::self_intersections::{CountInTime, count_within};
     use super::super::shapes;
     use super::*;
     use crate::math::Vec3;
@@ -319,5 +321,26 @@ mod tests {
         mesh.triangles.truncate(400);
         let found = report(&mesh).unwrap();
         assert_eq!((found.self_intersections, found.has_more), (4 * 100 * 99 / 2, false));
+    }
+
+    /// The boxes of all triangles around a vertex overlap.
+    #[test]
+    fn a_search_that_is_cut_short_is_said_to_be_also_if_it_found_nothing() {
+        let count = 100;
+        let around = |k: u32| {
+            let (sine, cosine) = libm::sincos(std::f64::consts::TAU * f64::from(k) / f64::from(count));
+            Vec3::new(cosine as f32, sine as f32, 0.0)
+        };
+        let mesh = TriangleMesh {
+            positions: std::iter::once(Vec3::ZERO).chain((0..count).map(around)).collect(),
+            triangles: (0..count).map(|k| [0, k + 1, (k + 1) % count + 1]).collect(),
+            ..Default::default()
+        };
+        let pairs = 100 * 99 / 2;
+        for (most, is_complete) in
+            [([pairs - 1, 0], false), ([pairs, 0], true), ([0, 49], false), ([0, 50], true)]
+        {
+            assert_eq!(count_within(&mesh, most), CountInTime { found: 0, is_complete }, "{most:?}");
+        }
     }
 }

@@ -67,30 +67,35 @@ const MOST_TESTED: [usize; 2] = [20_000_000, 60];
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct CountInTime {
     pub found: usize,
-    /// Whether all were counted.
+    /// Whether all pairs of triangles that may intersect were tested, and all that do were counted. Where not, there may be
+    /// more, even if none was found: boxes of triangles around a vertex of thousands overlap, whether or not they intersect.
     pub is_complete: bool,
 }
 
 /// Counts self-intersections as [`count_self_intersections`] does, but stops where so many triangles lie on each other that
 /// time would be quadratic. Triangles with the same corners are tested once.
 pub(super) fn count_in_time(mesh: &TriangleMesh) -> CountInTime {
+    count_within(mesh, MOST_TESTED)
+}
+
+/// Does what [`count_in_time`] does, with at most as many tests as given, in all and for each triangle, whichever are more.
+pub(super) fn count_within(mesh: &TriangleMesh, most: [usize; 2]) -> CountInTime {
     let (distinct, times) = distinct_triangles(mesh);
-    let most = MOST_TESTED[0].max(MOST_TESTED[1].saturating_mul(times.len()));
+    let most = most[0].max(most[1].saturating_mul(times.len()));
     let corners = |t: usize| distinct.triangles[t].map(|v| distinct.positions[v as usize]);
     let pairs = times.iter().enumerate().filter(|&(t, &times)| times > 1 && !collinear(corners(t)));
     let mut found = pairs.fold(0, |sum: usize, (_, &times)| sum.saturating_add(times * (times - 1) / 2));
-    let (mut tested, mut is_complete) = (0, found < MOST_FOUND);
-    if is_complete {
-        for_each_tested_pair(&distinct, |s, t, intersect| {
-            tested += 1;
-            if intersect {
-                found = found.saturating_add(times[s as usize].saturating_mul(times[t as usize]));
-            }
-            is_complete = tested < most && found < MOST_FOUND;
-            is_complete
-        });
-    }
-    CountInTime { found: found.min(MOST_FOUND), is_complete }
+    let (mut tested, mut is_complete) = (0, true);
+    for_each_tested_pair(&distinct, |s, t, intersect| {
+        // Asked when there is another pair: the last one ends a complete search.
+        is_complete = tested < most && found < MOST_FOUND;
+        tested += 1;
+        if is_complete && intersect {
+            found = found.saturating_add(times[s as usize].saturating_mul(times[t as usize]));
+        }
+        is_complete
+    });
+    CountInTime { found: found.min(MOST_FOUND), is_complete: is_complete && found <= MOST_FOUND }
 }
 
 /// Returns the valid triangles of a mesh, those with the same corners once, and how often each is there.

@@ -36,7 +36,8 @@ pub use isotropic::remesh;
 pub use plane_cut::{Plane, cut_by_plane};
 pub use resolve::{ContactPolicy, Pending, Resolver, TopologyGuide, Unguided};
 pub use restructure::{
-    EdgeBounds, EditPolicy, Unchecked, collapse_short, flip_for_valence, restructure, split_long,
+    EdgeBounds, EditPolicy, RestructurePass, Unchecked, collapse_short, flip_for_valence, restructure,
+    restructure_in_passes, split_long,
 };
 pub use sampling::Sampling;
 pub use smooth::{Smoothing, smooth};

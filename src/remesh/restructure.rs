@@ -8,7 +8,7 @@
 use super::{Changes, Embedding};
 use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::math::{Vec3, triangle};
-use crate::mesh::{EditError, Mesh, MeshError, OppositeVertices, VertexId};
+use crate::mesh::{EditError, MAX_VERTICES, Mesh, MeshError, OppositeVertices, VertexId};
 
 /// The shortest and the longest edge allowed (ε_min and ε_max of Kobbelt, Bareuther & Seidel), in units of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,12 +26,6 @@ impl EdgeBounds {
     }
 }
 
-/// The largest number of vertices of a remeshed mesh: a limit for use in a browser.
-pub(super) const MAX_VERTICES: usize = 8_000_000;
-/// The memory that a vertex takes during remeshing, in bytes, by which the error about a result that is too large
-/// estimates its size.
-const BYTES_PER_VERTEX: f64 = 250.0;
-
 /// The shortest upper bound of edge lengths, in spacings of single-precision numbers at the largest coordinate. Below a
 /// few spacings, edges cannot become as short as the bound, however often they are split, and triangles degenerate; at
 /// 64, positions are rounded by less than 1 % of an edge. With more, a mesh of 100,000 edges in a row is refused.
@@ -48,7 +42,7 @@ impl EdgeBounds {
     /// # Errors
     /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice `min`;
     /// [`MeshError::Precision`] if `max` is below 64 times the spacing of single-precision numbers at the largest
-    /// coordinate; [`MeshError::TooLarge`] if more than eight million vertices would be needed.
+    /// coordinate; [`MeshError::TooManyVertices`] if more than [`MAX_VERTICES`] would be needed.
     pub fn check_for(self, mesh: &Mesh) -> Result<(), MeshError> {
         let Self { min, max } = self;
         // Also rejects NaN.
@@ -57,13 +51,14 @@ impl EdgeBounds {
             return Err(MeshError::InvalidArgument { parameter: "edge", problem });
         }
         let area: f64 = mesh.triangles().map(|corners| triangle::area(mesh.facet(corners).points)).sum();
-        // The edge lengths account for needles, which have long edges and hardly any area.
-        let length = |(u, v)| mesh.position(u).as_dvec3().distance(mesh.position(v).as_dvec3());
-        let length: f64 = mesh.edges().map(length).sum();
         let [min, max] = [min, max].map(f64::from);
-        let vertices = VERTICES_PER_AREA * area / (min * max) + length / max;
+        // The splits account for needles, which have long edges and hardly any area.
+        let splits =
+            |(u, v)| (mesh.position(u).as_dvec3().distance(mesh.position(v).as_dvec3()) / max).floor();
+        let vertices = VERTICES_PER_AREA * area / (min * max) + mesh.edges().map(splits).sum::<f64>();
         if vertices >= MAX_VERTICES as f64 {
-            return Err(MeshError::TooLarge { bytes: bytes(vertices) });
+            // Saturates beyond the range.
+            return Err(MeshError::TooManyVertices { vertices: vertices as u64 });
         }
         self.check_precision(mesh)
     }
@@ -82,12 +77,6 @@ impl EdgeBounds {
         );
         Err(MeshError::Precision { problem })
     }
-}
-
-/// Returns the memory needed to remesh to a number of vertices, in bytes, for errors about results that are too large.
-pub(super) fn bytes(vertices: f64) -> u64 {
-    // Saturates beyond the range.
-    (vertices * BYTES_PER_VERTEX) as u64
 }
 
 /// Decides which edits restructuring makes, and how they are tested for self-intersections.
@@ -167,12 +156,69 @@ const PASSES: usize = 24;
 const HALVED: f32 = 0.5;
 
 /// Performs one round of restructuring: collapses short edges, splits long ones, and flips edges to bring valences near
-/// six. Rejected edits are skipped. Returns the numbers of edits.
+/// six. Rejected edits are skipped, and there are no splits beyond [`MAX_VERTICES`]. Returns the numbers of edits.
 pub fn restructure(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = collapse_short(mesh, bounds, edits);
-    changes += split_long(mesh, bounds, usize::MAX, edits);
+    changes += split_long(mesh, bounds, MAX_VERTICES, edits);
     changes += flip_for_valence(mesh, bounds, edits);
     changes
+}
+
+/// A pass of restructuring, for [`restructure_in_passes`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RestructurePass {
+    /// Collapses edges shorter than the lower bound, see [`collapse_short`].
+    Collapse,
+    /// Splits edges longer than the upper bound, see [`split_long`].
+    Split,
+    /// Flips edges to bring valences near six, see [`flip_for_valence`].
+    Flip,
+}
+
+/// Runs passes of restructuring in the given order, without tests for self-intersections; returns the numbers of edits.
+///
+/// # Errors
+/// Those of [`EdgeBounds::check_for`]; [`MeshError::TooManyVertices`] also where splits need more than [`MAX_VERTICES`], of
+/// which the estimate in advance may be half. The mesh is unchanged on error.
+pub fn restructure_in_passes(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    passes: &[RestructurePass],
+) -> Result<Changes, MeshError> {
+    bounds.check_for(mesh)?;
+    run_passes(mesh, bounds, passes, MAX_VERTICES)
+}
+
+/// Does what [`restructure_in_passes`] does, with at most `most` vertices, and unchecked bounds.
+fn run_passes(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    passes: &[RestructurePass],
+    most: usize,
+) -> Result<Changes, MeshError> {
+    let before = passes.contains(&RestructurePass::Split).then(|| mesh.clone());
+    let mut changes = Changes::default();
+    for pass in passes {
+        changes += match pass {
+            RestructurePass::Collapse => collapse_short(mesh, bounds, &mut Unchecked),
+            RestructurePass::Split => split_long(mesh, bounds, most, &mut Unchecked),
+            RestructurePass::Flip => flip_for_valence(mesh, bounds, &mut Unchecked),
+        };
+        let left = if mesh.vertex_count() >= most { long_edges(mesh, bounds).count() } else { 0 };
+        if let Some(before) = before.as_ref().filter(|_| left > 0 && *pass == RestructurePass::Split) {
+            let vertices = (mesh.vertex_count() + left) as u64;
+            mesh.clone_from(before);
+            return Err(MeshError::TooManyVertices { vertices });
+        }
+    }
+    Ok(changes)
+}
+
+/// Iterates over the edges longer than the upper bound, with their squared lengths.
+fn long_edges(mesh: &Mesh, bounds: EdgeBounds) -> impl Iterator<Item = (f32, (VertexId, VertexId))> + '_ {
+    let longest = bounds.max * bounds.max;
+    let square = |(u, v): (VertexId, VertexId)| mesh.position(u).distance_squared(mesh.position(v));
+    mesh.edges().map(move |edge| (square(edge), edge)).filter(move |&(square, _)| square > longest)
 }
 
 /// Collapses edges shorter than the lower bound into the end of higher valence, or into the other if that is rejected
@@ -262,12 +308,9 @@ pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
 /// & Seidel, figure 5) or the mesh has `most` vertices; rejected splits are skipped. Returns the number of splits.
 pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut impl EditPolicy) -> Changes {
     let mut changes = Changes::default();
-    let longest = bounds.max * bounds.max;
     for _ in 0..PASSES {
         let before = changes.creations;
-        let square = |(u, v): (VertexId, VertexId)| mesh.position(u).distance_squared(mesh.position(v));
-        let all = mesh.edges().map(|edge| (square(edge), edge));
-        let mut long: Vec<_> = all.filter(|&(square, _)| square > longest).collect();
+        let mut long: Vec<_> = long_edges(mesh, bounds).collect();
         sort_by_rank(&mut long, |&(_, (u, v))| combined_rank(u.0, v.0));
         sort_by_rank(&mut long, |&(square, _)| (!rank_f32(square)).into());
         for (square, (u, v)) in long {
@@ -379,4 +422,39 @@ pub(super) fn may_flip(mesh: &Mesh, bounds: EdgeBounds, ends: [VertexId; 2], acr
     let before = [(q - p).cross(a - p), (b - p).cross(q - p)];
     let after = [(b - p).cross(a - p), (a - q).cross(b - q)];
     before.into_iter().all(|old| after.into_iter().all(|new| faces_alike(old, new)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    #[cfg(target_arch = "wasm32")]
+    use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn a_large_mesh_that_keeps_its_edges_is_not_refused() {
+        let mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.004).unwrap();
+        let edge = mesh.longest_edge();
+        assert_eq!(EdgeBounds { min: 0.5 * edge, max: 1.2 * edge }.check_for(&mesh), Ok(()));
+        let refused = EdgeBounds { min: 0.2 * edge, max: 0.5 * edge }.check_for(&mesh);
+        assert!(matches!(refused, Err(MeshError::TooManyVertices { .. })));
+    }
+
+    #[test]
+    fn passes_that_need_too_many_vertices_change_nothing() {
+        let before = Mesh::icosphere(Vec3::ZERO, 1.0, 0.3).unwrap();
+        let bounds = EdgeBounds { min: 0.01, max: 0.05 };
+        let split = [RestructurePass::Collapse, RestructurePass::Split, RestructurePass::Flip];
+        let mut mesh = before.clone();
+        run_passes(&mut mesh, bounds, &split, usize::MAX).unwrap();
+        let needed = mesh.vertex_count();
+        let mut mesh = before.clone();
+        let refused = run_passes(&mut mesh, bounds, &split, needed - 1);
+        assert_eq!(refused, Err(MeshError::TooManyVertices { vertices: needed as u64 }));
+        assert!(mesh == before);
+        // Those that add none, or no more than that, are not refused.
+        run_passes(&mut mesh, bounds, &split, needed).unwrap();
+        assert_eq!(mesh.vertex_count(), needed);
+        let mut mesh = before.clone();
+        run_passes(&mut mesh, bounds, &[RestructurePass::Collapse, RestructurePass::Flip], 1).unwrap();
+    }
 }

@@ -11,8 +11,8 @@ pub enum VolumeError {
         /// Reason for the rejection, with the accepted values.
         problem: String,
     },
-    /// An allocation failed, or a mesh would have more vertices than `u32` can count.
-    #[error("the volume needs {bytes} bytes, more than is available")]
+    /// An allocation failed, or a limit would be exceeded, such as that of the triangles of a contour.
+    #[error("the volume needs {bytes} bytes, more than is allowed, or left of the 4 GiB of WebAssembly")]
     TooLarge {
         /// Memory that the operation would need, in bytes.
         bytes: u64,

@@ -239,6 +239,49 @@ fn polygons_with_too_many_corners_are_said() {
     assert_warned(&file, &["Concave polygons with too many corners"]);
 }
 
+/// Returns what the reader says about an OBJ file with one face.
+fn warnings_about_face(corners: &[[f64; 3]]) -> Vec<String> {
+    let vertices: String = corners.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    let indices: String = (1..=corners.len()).map(|k| format!(" {k}")).collect();
+    read(format!("{vertices}f{indices}\n").as_bytes())
+        .warnings
+        .into_iter()
+        .map(|warning| warning.text)
+        .collect()
+}
+
+#[test]
+fn polygons_that_intersect_themselves_are_said() {
+    let bow_tie = [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let uneven = [[0.0, 0.0, 0.0], [1.0, 1.0, 0.3], [1.0, 0.0, 0.3], [0.0, 0.5, 0.0]];
+    let star = [0, 2, 4, 1, 3].map(|k| {
+        let (y, x) = libm::sincos(f64::from(k) * std::f64::consts::TAU / 5.0);
+        [x, y, 0.5 * x]
+    });
+    let zigzag: Vec<[f64; 3]> = (0..50).map(|k| [f64::from(k) + 0.5, f64::from(k % 2) * 9.0, 0.0]).collect();
+    let back = (0..50).rev().map(|k| [f64::from(k) + 0.5, f64::from((k + 1) % 2) * 9.0, 0.0]);
+    let zigzag: Vec<[f64; 3]> = zigzag.into_iter().chain(back).collect();
+    for face in [&bow_tie[..], &uneven, &star, &zigzag] {
+        let found = warnings_about_face(face);
+        assert!(found.len() == 1 && found[0].starts_with("Polygons that intersect themselves"), "{found:?}");
+        assert!(found[0].contains(": 1."), "{found:?}");
+    }
+}
+
+#[test]
+fn polygons_that_are_bent_or_rounded_are_not_said_to_intersect_themselves() {
+    // Four corners of a regular tetrahedron, the most that a square can be bent without a fold.
+    let skew = [[0.0, 0.0, 0.0], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0], [0.0, 1.0, 1.0]];
+    let dart = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [1.0, 1.0, 1.5], [0.0, 4.0, 0.0]];
+    // A sliver of five corners in a row, rounded to six digits.
+    let sliver = [[0.0, 0.0], [1.0, 1e-6], [2.0, 0.0], [1.2, -1e-6], [0.7, 1e-6]].map(|[x, y]| [x, y, 0.5]);
+    // There and back.
+    let line = [0.0, 1.0, 2.0, 1.0].map(|x| [x, 0.3 * x, 0.7 * x]);
+    for face in [&skew[..], &dart, &sliver, &line] {
+        assert_eq!(warnings_about_face(face), [""; 0]);
+    }
+}
+
 fn ply(header: &str, body: &[u8]) -> Vec<u8> {
     let mut out = format!("{header}end_header\n").into_bytes();
     CORNERS.as_flattened().iter().for_each(|x| out.extend(x.to_le_bytes()));

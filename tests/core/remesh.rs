@@ -213,7 +213,10 @@ fn a_result_that_exceeds_memory_is_refused_in_advance() {
         for max in [1e-6, 1e-30] {
             let mut mesh = before.clone();
             let error = remesh(&mut mesh, EdgeBounds { min: max / 3.0, max }).unwrap_err();
-            assert!(matches!(error, MeshError::TooLarge { bytes } if bytes > 1_000_000_000), "{error}");
+            assert!(
+                matches!(error, MeshError::TooManyVertices { vertices } if vertices > 4_000_000),
+                "{error}"
+            );
             assert_eq!(mesh, before);
         }
     }
@@ -253,7 +256,8 @@ fn edges_finer_than_coordinates_are_refused() {
         let mut far = Mesh::from_triangles(&far).unwrap();
         let before = far.clone();
         let refused = remesh(&mut far, about(edge));
-        let is_known = matches!(refused, Err(MeshError::Precision { .. } | MeshError::TooLarge { .. }));
+        let is_known =
+            matches!(refused, Err(MeshError::Precision { .. } | MeshError::TooManyVertices { .. }));
         assert!(is_known, "{at}: {refused:?}");
         assert!(far == before);
         restructure(&mut far, about(edge), &mut Unchecked);

@@ -44,6 +44,9 @@ const FEW_POINTS: usize = 20;
 /// Ratio of the least to the largest standard deviation of points along their principal axes up to which a cloud counts
 /// as flat, and is rejected because it spans no volume.
 const FLAT: f64 = 1e-6;
+/// The refusal of points that span no volume. An outlier that is far enough away has the same effect as a plane.
+const FLAT_CLOUD: &str = "have to span a volume: all lie in one plane, or some are so far away that the others coincide in \
+                          comparison; remove such outliers, or add points outside the plane";
 
 impl Cloud {
     /// Checks that each array has one entry per point, that all values are finite, and that confidences are in (0, 1].
@@ -132,7 +135,7 @@ impl Cloud {
             sum + symmetric::outer(d)
         }));
         if spread.x <= FLAT * FLAT * spread.z {
-            return Err(MethodError::invalid("points", "all lie in one plane; they have to span a volume"));
+            return Err(MethodError::invalid("points", FLAT_CLOUD));
         }
         Ok(())
     }
@@ -476,5 +479,9 @@ pub mod tests {
         ] {
             assert!(matches!(flat, Err(MethodError::InvalidArgument { parameter: "points", .. })));
         }
+        // In comparison with a distance of 10³⁰, a ball is one point.
+        let points = ball.iter().copied().chain([Vec3::X * 1e30]).collect();
+        let refused = Cloud { points, ..Cloud::default() }.check_span().unwrap_err().to_string();
+        assert!(refused.contains("so far away") && refused.contains("outliers"), "{refused}");
     }
 }

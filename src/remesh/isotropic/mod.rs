@@ -20,10 +20,10 @@ mod one_ring;
 mod relax;
 mod session;
 
-use super::restructure::{MAX_VERTICES, bytes, collapse_short, flip_for_valence, split_long};
+use super::restructure::{collapse_short, flip_for_valence, split_long};
 use super::unit_scale::unit_scale;
 use super::{Changes, EdgeBounds, EditPolicy, Embedding, Unchecked};
-use crate::mesh::{Mesh, MeshError};
+use crate::mesh::{MAX_VERTICES, Mesh, MeshError};
 use conflicts::ConflictMask;
 use min_angle::improve_angles;
 use relax::relax;
@@ -62,7 +62,7 @@ const INPUT_TEST_RUN: usize = 1;
 /// # Errors
 /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice `min`;
 /// [`MeshError::Precision`] if `max` is below 64 times the spacing of single-precision numbers at the largest coordinate;
-/// [`MeshError::TooLarge`] if more than eight million vertices would be needed. The mesh is unchanged on error.
+/// [`MeshError::TooManyVertices`] if more than [`MAX_VERTICES`] would be needed. The mesh is unchanged on error.
 pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError> {
     bounds.check_for(mesh)?;
     // A mesh collapsed to one point has no surface; every edit would be tested against all its triangles.
@@ -74,8 +74,9 @@ pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError>
     mesh.positions_mut().iter_mut().for_each(|p| *p *= shrink);
     let changes = remesh_scaled(mesh, bounds.scaled(shrink));
     if mesh.vertex_count() >= MAX_VERTICES {
+        let vertices = mesh.vertex_count() as u64;
         mesh.clone_from(&before);
-        return Err(MeshError::TooLarge { bytes: bytes(MAX_VERTICES as f64) });
+        return Err(MeshError::TooManyVertices { vertices });
     }
     mesh.reorder();
     mesh.positions_mut().iter_mut().for_each(|p| *p *= grow);
@@ -154,8 +155,8 @@ fn last_round<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut 
     changes
 }
 
-/// Makes one round of collapses, splits and flips as [`restructure`](super::restructure()) does, with at most eight
-/// million vertices; returns the changes made.
+/// Makes one round of collapses, splits and flips as [`restructure`](super::restructure()) does, with at most
+/// [`MAX_VERTICES`]; returns the changes made.
 fn pass<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
     let mut changes = collapse_short(mesh, bounds, session);
     changes += split_long(mesh, bounds, MAX_VERTICES, session);
