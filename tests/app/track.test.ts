@@ -108,6 +108,28 @@ describe('the computed ventricle', () => {
     expect(systole).toBe(4);
   });
 
+  test('what is being typed stays while an earlier change takes effect', async () => {
+    const threshold = app.page.locator('[data-param=threshold] input[type=number]');
+    // At once, so that the change takes effect afterwards.
+    await threshold.evaluate((field: HTMLInputElement) => {
+      field.focus();
+      field.value = '40';
+      field.dispatchEvent(new Event('change'));
+      field.value = '48.5';
+    });
+    await expect.poll(hash).toContain('p.threshold=40');
+    await reach(app.page, 'done');
+    expect(await threshold.inputValue()).toBe('48.5');
+    // A change that is left as it was shows what is in force.
+    await threshold.fill('40');
+    await threshold.blur();
+    expect(await threshold.inputValue()).toBe('40');
+    await threshold.fill('48.5');
+    await threshold.press('Enter');
+    await expect.poll(hash).toContain('p.threshold=48.5');
+    await openAt('#track?example=ventricle', 'done');
+  });
+
   test('describes the curve in words, together with the truth', async () => {
     // The text is updated when the curve is drawn, in the next animation frame.
     const words = /^End-diastole \(ED\) in frame \d+: [\d.]+ ml; end-systole .* Ground truth: /;

@@ -1,7 +1,7 @@
 import type { ParamSpec } from '../protocol';
 import { text } from '../texts';
 import { h } from './dom';
-import { Field } from './field';
+import { Field, showIn } from './field';
 import { figure } from './format';
 
 /**
@@ -72,7 +72,7 @@ export class EdgeThreshold {
     Object.assign(this.#slider, { max: String(top), step: String(top / 500) });
     this.#slider.valueAsNumber = threshold;
     this.#slider.setAttribute('aria-valuetext', figure(threshold));
-    this.#number.value = String(Number(threshold.toPrecision(6)));
+    showIn(this.#number, String(Number(threshold.toPrecision(6))));
     this.#noise.textContent = text('trackPanels.noiseEstimate', {
       noise: figure(rounded(noise)),
       suggested: figure(rounded(suggested)),

@@ -1,7 +1,7 @@
 import type { VolumeView } from '../protocol';
 import { text } from '../texts';
 import { context2d, h, onSchemeChange, token } from './dom';
-import { Field } from './field';
+import { Field, showIn } from './field';
 import { figure } from './format';
 
 /**
@@ -55,7 +55,7 @@ export class Histogram {
   setIso(iso: number): void {
     this.#slider.valueAsNumber = iso;
     this.#slider.setAttribute('aria-valuetext', figure(iso));
-    this.#number.value = String(Number(iso.toPrecision(6)));
+    showIn(this.#number, String(Number(iso.toPrecision(6))));
     this.#field.showError(undefined);
     this.#draw();
   }

@@ -1,7 +1,7 @@
 import type { ParamSpec, ParamValues } from '../protocol';
 import { text } from '../texts';
 import { h } from './dom';
-import { Field, type FormControl, selectFrom } from './field';
+import { Field, type FormControl, selectFrom, showIn } from './field';
 import { figure } from './format';
 
 /**
@@ -159,7 +159,7 @@ function withNumber({ main, show }: Input, spec: ParamSpec, onChange: (value: un
     const given = typeof value === 'number';
     show(given ? NUMBER : value);
     row.hidden = !given;
-    field.value = given ? typed(value) : '';
+    showIn(field, given ? typed(value) : '');
   };
   return { main, extra: [row], show: showEither };
 }
@@ -200,7 +200,7 @@ function numberInput(spec: ParamSpec, onChange: (value: unknown) => void): Input
   const main = h('input', { type: 'number', min, max, step: 'any', inputmode: 'decimal' });
   const slider = min !== undefined && max !== undefined && max < ENDLESS ? new Slider(spec, min, max) : undefined;
   const show = (value: unknown) => {
-    main.value = typeof value === 'number' ? typed(value) : String(value);
+    showIn(main, typeof value === 'number' ? typed(value) : String(value));
     if (typeof value === 'number') slider?.show(value);
   };
   // Empty or invalid input is passed on as NaN, so that the library itself reports what is accepted.

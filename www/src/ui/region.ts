@@ -4,7 +4,7 @@ import type { VoxelBox } from '../track/box';
 import type { Cavity } from '../track/protocol';
 import { SLICE_NAMES, type SliceOrientation } from '../view/anatomy';
 import { h } from './dom';
-import { Field } from './field';
+import { Field, showIn } from './field';
 
 export interface RegionEvents {
   onRegion: (region: VoxelBox | undefined) => void;
@@ -97,7 +97,7 @@ export class RegionControls {
       this.#names[axis]?.replaceChildren(name);
       for (const [side, input] of this.#inputs.slice(2 * axis, 2 * axis + 2).entries()) {
         input.max = String((dims[axis] ?? 1) - 1);
-        input.value = String((side === 0 ? region.low : region.high)[axis] ?? 0);
+        showIn(input, String((side === 0 ? region.low : region.high)[axis] ?? 0));
         input.setAttribute(
           'aria-label',
           text(side === 0 ? 'trackPanels.firstSlice' : 'trackPanels.lastSlice', { name }),
