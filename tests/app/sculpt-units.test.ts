@@ -261,4 +261,21 @@ describe('the preview', () => {
     expect(model.params).toMatchObject(set);
     model.free();
   });
+
+  test('refuses no pose that the parameters of the user allow', () => {
+    // Edges may be 1.6 times as long as the radius of a tip.
+    const set = { edgeMin: 0.1, edgeMax: 0.25, supersample: 0 };
+    const model = new MultiresolutionModel({ ellipsoids: [ball(0, 0, 0, 1)], params: set });
+    const preview = new Preview();
+    preview.prepare(model, 'drag', 200);
+    expect(model.params).toMatchObject({ edgeMax: 0.5 });
+    preview.aim(model, [ball(0, 0, 0, 0.2)]);
+    expect(model.params).toMatchObject(set);
+    preview.prepare(model, 'drag', 200);
+    expect(model.params).toMatchObject(set);
+    const { targets } = model;
+    expect(() => preview.aim(model, [ball(0, 0, 0, 0.1)])).toThrow('tips of radius 0.1');
+    expect(model.targets).toEqual(targets);
+    model.free();
+  });
 });

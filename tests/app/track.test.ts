@@ -120,7 +120,7 @@ describe('the computed ventricle', () => {
     await expect.poll(hash).toContain('p.threshold=40');
     await reach(app.page, 'done');
     expect(await threshold.inputValue()).toBe('48.5');
-    // A change that is left as it was shows what is in force.
+    // Without a change, the field shows what is in force when it is left.
     await threshold.fill('40');
     await threshold.blur();
     expect(await threshold.inputValue()).toBe('40');

@@ -1,4 +1,5 @@
 import type { MultiresolutionModel, MultiresParams } from 'vesicle';
+import type { Pose } from './protocol';
 
 /**
  * Longest duration of a step of the model during a drag, milliseconds; after a slower one the preview uses longer
@@ -31,6 +32,17 @@ export class Preview {
     else if (!this.#saved && model.params.supersample > 0) this.#change(model, { supersample: 0 });
   }
 
+  /** Sets the model's target pose; one that is refused for the longer edges of the preview ends it. */
+  aim(model: MultiresolutionModel, pose: Pose): void {
+    try {
+      model.setEllipsoids(pose);
+    } catch (error) {
+      if (!this.#coarse) throw error;
+      this.end(model);
+      model.setEllipsoids(pose);
+    }
+  }
+
   /** Ends the preview: restores the model's parameters as the user set them. */
   end(model: MultiresolutionModel): void {
     if (this.#saved) model.setParams(this.#saved);
@@ -41,7 +53,12 @@ export class Preview {
   #coarsen(model: MultiresolutionModel): void {
     const { edgeMin, edgeMax } = model.params;
     this.#coarse = true;
-    this.#change(model, { edgeMin: EDGE_FACTOR * edgeMin, edgeMax: EDGE_FACTOR * edgeMax, supersample: 0 });
+    try {
+      this.#change(model, { edgeMin: EDGE_FACTOR * edgeMin, edgeMax: EDGE_FACTOR * edgeMax, supersample: 0 });
+    } catch {
+      // The surface would slip off the tips of the ellipsoids.
+      this.#change(model, { supersample: 0 });
+    }
   }
 
   #change(model: MultiresolutionModel, params: MultiresParams): void {

@@ -13,6 +13,12 @@ export class TargetPath {
   #playing = false;
   /** Remaining poses of the glide to the last pose requested, one per frame. */
   #glide: Pose[] = [];
+  readonly #aim: (model: MultiresolutionModel, pose: Pose) => void;
+
+  /** `aim` sets the model's target pose, or throws if the model rejects it. */
+  constructor(aim: (model: MultiresolutionModel, pose: Pose) => void) {
+    this.#aim = aim;
+  }
 
   get film(): Film | undefined {
     return this.#film;
@@ -70,7 +76,7 @@ export class TargetPath {
 
   /** Sets the model's target pose at once, as during a drag; ends playing and gliding. */
   jumpTo(model: MultiresolutionModel, pose: Pose): void {
-    model.setEllipsoids(pose);
+    this.#aim(model, pose);
     this.#glide = [];
     this.#playing = false;
   }
@@ -78,8 +84,8 @@ export class TargetPath {
   /** Starts a glide to a pose, frame by frame. Throws at once if the model rejects the pose. */
   glideTo(model: MultiresolutionModel, pose: Pose): void {
     const from = model.targets;
-    model.setEllipsoids(pose);
-    model.setEllipsoids(from);
+    this.#aim(model, pose);
+    this.#aim(model, from);
     this.#glide = glide(from, pose);
     this.#playing = false;
   }
@@ -87,7 +93,7 @@ export class TargetPath {
   /** Sets the model's target to the next pose of the film or glide, if there is one; called before each step. */
   next(model: MultiresolutionModel): void {
     const next = this.#playing ? this.#nextOfFilm() : this.#glide.shift();
-    if (next) model.setEllipsoids(next);
+    if (next) this.#aim(model, next);
   }
 
   #nextOfFilm(): Pose | undefined {

@@ -58,7 +58,7 @@ class Session {
   #start: Pose = [];
   #support: Support = 'membrane';
   #view: FrameContents = { layout: 'result', quantity: undefined, textured: false };
-  readonly #path = new TargetPath();
+  readonly #path = new TargetPath((model, pose) => this.#preview.aim(model, pose));
   #dragging = false;
   #poseId = 0;
   /** Reports of the latest steps, which have not been sent to the page yet. */

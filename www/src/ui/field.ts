@@ -57,7 +57,7 @@ export class Field<Control extends FormControl = HTMLInputElement> {
   }
 }
 
-/** What is to be in a number field, and was last put there. */
+/** The value that a field is to show, and that which was last put there. */
 interface Shown {
   value: string;
   there: string;
@@ -79,7 +79,7 @@ export function showIn(field: HTMLInputElement, value: string): void {
 function watched(field: HTMLInputElement): Shown {
   const one = { value: field.value, there: field.value };
   shown.set(field, one);
-  // What has been entered is no longer being typed.
+  // A value that has been entered is no longer being typed.
   const entered = () => {
     one.there = field.value;
   };
