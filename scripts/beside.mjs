@@ -27,8 +27,8 @@ export async function filesBelow(folder, names) {
 }
 
 /**
- * Reads the files in a folder whose names match, but for those that belong to others: gives on what `read` finds in each, and a
- * `failure` for one that cannot be read.
+ * Iterates over what `read` yields for each file of a folder whose name matches `names`, without those that match `belonging`, which
+ * are read with another. A file that throws yields its name and the error, as `failure`.
  */
 export async function* readEach(folder, names, belonging, read) {
   const all = await filesBelow(folder, names);

@@ -24,7 +24,7 @@ impl Pauses {
         }
     }
 
-    /// Pauses, after work that is no multiple of anything.
+    /// Pauses at once, between two parts of a computation.
     pub async fn now(&self) {
         self.0.set(0);
         pause().await;

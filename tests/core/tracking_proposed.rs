@@ -177,6 +177,17 @@ fn the_edge_of_what_is_around_an_object_is_not_its_own() {
     }
 }
 
+/// As in CT, where lung is much darker than muscle: a threshold above that step would lose the object.
+#[test]
+fn steps_around_an_object_that_are_higher_than_its_own_do_not_raise_the_threshold() {
+    let scene =
+        Scene { muscle: 130.0, pillar: 0.0, radii: [15.0, 14.0, 12.0, 11.0, 12.0, 14.0], ..Scene::new() };
+    let query = Query::Point { at: scene.world(Scene::center(0)), frame: 0 };
+    let proposal = SurfaceTracker::propose(&scene.volume(), query).unwrap();
+    let step = BALL - scene.muscle;
+    assert!((0.3 * step..0.62 * step).contains(&proposal.threshold), "{}", proposal.threshold);
+}
+
 #[test]
 fn a_proposed_box_lies_within_a_given_one() {
     let scene = Scene { affine: DAffine3::from_scale(SPACING), ..Scene::new() };

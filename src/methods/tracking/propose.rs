@@ -324,7 +324,9 @@ impl Found {
     /// Returns the edge threshold, in units of intensity.
     fn threshold(&self, sequence: &CoarseSequence) -> f64 {
         let step = self.inside - self.outside;
-        let around = (THRESHOLD_AROUND * self.step_around).min(MOST_OF_STEP * step);
+        let around = THRESHOLD_AROUND * self.step_around;
+        // No threshold excludes higher steps and keeps the object.
+        let around = if around <= MOST_OF_STEP * step { around } else { 0.0 };
         (THRESHOLD * step).max(around).max(2.5 * sequence.noise) * sequence.quantum
     }
 }
