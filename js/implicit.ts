@@ -54,11 +54,13 @@ export interface ImplicitParams {
    */
   level?: 'zero' | 'mean';
   /**
-   * Sides of the surface with constraints: `'both'`, the default, −1 outside and 1 inside, so that noise does not shrink the
-   * surface, and parts that no point supports are left out; or `'outside'`, the paper's. Where cameras or exterior points are
-   * given, these say which side is outside.
+   * Sides of the surface with constraints: `'both'`, −1 outside and 1 inside, so that noise does not shrink the surface, and
+   * parts that no point supports are left out; or `'outside'`, the paper's. `'auto'`, the default, is both, unless the points
+   * do not tell the sides apart (warning `thin-parts`), and are nearer to a coarse surface with constraints outside only; the
+   * choice takes about as long as the run itself. Where cameras or exterior points are given, these say which side is
+   * outside.
    */
-  sides?: 'both' | 'outside';
+  sides?: 'auto' | 'both' | 'outside';
 }
 
 /** Measures of points, and the values that an implicit surface chose by them, in units of the normalised box. */
@@ -73,6 +75,8 @@ export interface ImplicitChoice {
   lambdaExterior: number;
   /** That of `delta`. */
   delta: number;
+  /** The value of `sides` in force; absent until it is known. */
+  sides?: 'both' | 'outside';
 }
 
 /** A camera from which the points were reconstructed, or with which the mesh is coloured. */

@@ -12,7 +12,7 @@ import {
   type Stepper,
   type StepReport,
 } from './stepper.js';
-import { RawProposal, RawTracker, TriangleCopy } from './vesicle.js';
+import { RawProposal, RawTracker, RawTrackerCreation, TriangleCopy } from './vesicle.js';
 import { type Volume, volumeHandle } from './volume.js';
 import { ModelWarnings, notesOf } from './warnings.js';
 
@@ -198,20 +198,39 @@ export class SurfaceTracker implements Stepper {
    *   `too-large`.
    */
   constructor(given: TrackingOptions) {
-    const known = checkProperties('options', given, OPTIONS) as TrackingOptions;
-    const image = volumeHandle('volume', known.volume);
-    const [box, voxels, nearest] = [corners(known.box), ends(known.voxels), point(known.component)];
-    if (box && voxels) throw invalid('voxels', 'give either box or voxels, not both');
-    const params = shallowCopy('params', known.params ?? {});
-    const isClosed = isClosedCavity(known.cavity);
-    this.#frameSeconds = image.use((raw) => raw.frameSeconds()) || FRAME_SECONDS;
-    this.#handle = new Handle('SurfaceTracker', () =>
-      image.use((raw) => new RawTracker(raw, box, voxels, nearest, triangles(known.start), isClosed, params)),
-    );
+    const created = given instanceof Created ? given : undefined;
+    const known = created ? created.options : checked(given);
+    this.#frameSeconds = volumeHandle('volume', known.volume).use((raw) => raw.frameSeconds()) || FRAME_SECONDS;
+    const make = () => beginning(known, (...of) => new RawTracker(...of));
+    this.#handle = created ? created.handle : new Handle('SurfaceTracker', make());
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     this.#warnings = new ModelWarnings(known.volume.warnings, known.start?.warnings);
     this.#frame = frameOf(known.volume);
     this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of({ frame: this.frame }), this.#frame);
+  }
+
+  /**
+   * Creates a tracker as the constructor does, bit for bit, yielding to the event loop between slices of work: reading a long
+   * sequence takes seconds. The volume must not be freed before.
+   *
+   * @param options - `signal`: aborts the creation; `budgetMs`: duration of a slice, milliseconds, default 12.
+   * @throws As the constructor; `signal.reason` when aborted.
+   */
+  static async create(given: TrackingOptions, options?: SliceOptions): Promise<SurfaceTracker> {
+    const { signal, budgetMs } = checkedSlices(options);
+    signal?.throwIfAborted();
+    const known = checked(given);
+    const creation = new Handle(
+      'SurfaceTracker',
+      beginning(known, (...of) => new RawTrackerCreation(...of)),
+    );
+    try {
+      const raw = await runInSlices(() => creation.use((one) => one.advance()), signal, budgetMs);
+      const handle = new Handle('SurfaceTracker', () => raw);
+      return new SurfaceTracker(new Created(known, handle) as unknown as TrackingOptions);
+    } finally {
+      creation.free();
+    }
   }
 
   /**
@@ -457,6 +476,28 @@ function ends(voxels: TrackingOptions['voxels']): Uint32Array | undefined {
   const { min, max } = checkProperties('voxels', voxels, ['min', 'max']);
   const indices = [...vec3('voxels.min', min), ...vec3('voxels.max', max)];
   return Uint32Array.from(indices, (index) => integer('voxels', index));
+}
+
+/** Arguments that {@link SurfaceTracker.create} passes to the constructor. */
+class Created {
+  constructor(
+    readonly options: TrackingOptions,
+    readonly handle: Handle<RawTracker>,
+  ) {}
+}
+
+function checked(given: TrackingOptions): TrackingOptions {
+  return checkProperties('options', given, OPTIONS) as TrackingOptions;
+}
+
+/** Returns a function that makes what needs the arguments of a tracker. */
+function beginning<T>(options: TrackingOptions, make: (...of: ConstructorParameters<typeof RawTracker>) => T): () => T {
+  const image = volumeHandle('volume', options.volume);
+  const [box, voxels, nearest] = [corners(options.box), ends(options.voxels), point(options.component)];
+  if (box && voxels) throw invalid('voxels', 'give either box or voxels, not both');
+  const params = shallowCopy('params', options.params ?? {});
+  const isClosed = isClosedCavity(options.cavity);
+  return () => image.use((raw) => make(raw, box, voxels, nearest, triangles(options.start), isClosed, params));
 }
 
 function isClosedCavity(cavity: TrackingOptions['cavity']): boolean {

@@ -207,7 +207,7 @@ export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N
   Mesh: { icosphere: 'method', fromArrays: 'method', parse: 'method', marchingCubes: 'method' },
   DeformableModel: { maxLevels: 'method', create: 'method' },
   ImplicitSurface: {},
-  SurfaceTracker: { propose: 'method' },
+  SurfaceTracker: { propose: 'method', create: 'method' },
   MultiresolutionModel: {},
   LabelSurfaces: { create: 'method' },
 };

@@ -31,14 +31,22 @@ const only = (method) => ({
 /** The readers of files alone, which have glue of another name, since they have other classes. */
 const READERS = { target: 'target', name: 'import/vesicle_bg', features: ['import'], glue: 'files' };
 
-const MODULES = [WHOLE, ...METHODS.map(only), READERS];
+const METHOD_MODULES = METHODS.map(only);
+
+const MODULES = [WHOLE, ...METHOD_MODULES, READERS];
+
+/** How modules are made: as the package has them, or in a quarter of the time, larger and somewhat slower, with the same results. */
+const WAYS = {
+  release: { profile: 'release', optimises: true },
+  quick: { profile: 'quick', optimises: false },
+};
 
 /** Folder of a module's glue, and of the module as the glue needs it. */
 const folder = ({ name }) => at('target/modules', name);
 
 const glueName = ({ glue = 'vesicle' }) => glue;
 
-const optimised = (module) => join(folder(module), `${glueName(module)}_bg.wasm`);
+const made = (module) => join(folder(module), `${glueName(module)}_bg.wasm`);
 
 // Documents that the README links to.
 const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md', 'CHANGELOG.md', 'docs'];
@@ -61,9 +69,9 @@ const FORMATS = ['dicom', 'gltf', 'tiff', 'zarr'];
  * Compiles a module and returns its path. The core is compiled once for all modules of a target directory with the same
  * features of its own.
  */
-async function compile(module) {
+async function compile(module, { profile }) {
   const { target, features, env } = module;
-  const args = ['build', '--locked', '-p', 'vesicle-bindings', '--release'];
+  const args = ['build', '--locked', '-p', 'vesicle-bindings', '--profile', profile];
   const selected = features ? ['--no-default-features', '--features', features.join()] : [];
   await must('cargo', [...args, '--target', 'wasm32-unknown-unknown', ...selected, '--target-dir', at(target)], {
     env,
@@ -71,15 +79,15 @@ async function compile(module) {
   // The next module of the directory replaces it.
   const compiled = at('target/modules', `${module.name.replace('/', '-')}.wasm`);
   await mkdir(at('target/modules'), { recursive: true });
-  await copyFile(at(target, 'wasm32-unknown-unknown/release/vesicle_bindings.wasm'), compiled);
+  await copyFile(at(target, 'wasm32-unknown-unknown', profile, 'vesicle_bindings.wasm'), compiled);
   return compiled;
 }
 
 /** The last module of each target directory, whose modules are compiled one after the other. */
 const turns = new Map();
 
-function compileInTurn(module) {
-  const compiled = (turns.get(module.target) ?? Promise.resolve()).then(() => compile(module));
+function compileInTurn(module, way) {
+  const compiled = (turns.get(module.target) ?? Promise.resolve()).then(() => compile(module, way));
   turns.set(module.target, compiled);
   return compiled;
 }
@@ -105,18 +113,27 @@ async function sourceHash() {
   return hash.digest('hex');
 }
 
+const stampOf = ({ profile }, sources) => `${profile} ${sources}`;
+
+const stampFile = (module) => join(folder(module), 'stamp');
+
+async function isMade(module, way, sources) {
+  const file = stampFile(module);
+  return existsSync(file) && (await readFile(file, 'utf8')) === stampOf(way, sources);
+}
+
 /** Compiles a module, and makes its glue, unless that was done from the same `sources`. */
-async function make(module, sources) {
-  const stampFile = join(folder(module), 'stamp');
-  if (existsSync(stampFile) && (await readFile(stampFile, 'utf8')) === sources) return;
-  const compiled = await compileInTurn(module);
-  await rm(folder(module), { recursive: true, force: true });
+async function make(module, way, sources) {
+  if (await isMade(module, way, sources)) return;
+  const into = folder(module);
+  const compiled = await compileInTurn(module, way);
+  await rm(into, { recursive: true, force: true });
   await must('cargo', [
     ...['run', '--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')],
-    ...['--', 'bindgen', compiled, folder(module), glueName(module)],
+    ...['--', 'bindgen', compiled, into, glueName(module)],
   ]);
-  await optimise(optimised(module));
-  await writeFile(stampFile, sources);
+  if (way.optimises) await optimise(made(module));
+  await writeFile(stampFile(module), stampOf(way, sources));
 }
 
 /** The modules of the whole library are called by the same glue. */
@@ -147,7 +164,7 @@ async function assemble(modules) {
     const module = MODULES.find(({ name }) => name.startsWith(`${entry}/`));
     return join(folder(module), glueName(module));
   });
-  for (const module of modules) await copyFile(optimised(module), at('pkg', `${module.name}.wasm`));
+  for (const module of modules) await copyFile(made(module), at('pkg', `${module.name}.wasm`));
   await makeInline();
   await makeElement();
   await writeNotices('pkg/licences.txt', 'element');
@@ -201,17 +218,33 @@ async function manifest(modules) {
 
 /**
  * The whole package, or all but its module without vector instructions, which needs a compilation of its own; fast
- * where nothing changed.
+ * where nothing changed. `quick`: the latter with one module, not optimised as a whole, in place of each other, unless the
+ * others are there.
  */
-export async function build({ plain = true } = {}) {
+export async function build({ plain = true, quick = false } = {}) {
   const started = performance.now();
   const sources = await sourceHash();
-  const modules = plain ? [...MODULES, PLAIN] : MODULES;
-  await Promise.all(modules.map((module) => make(module, sources)));
-  if (plain) await compareGlue();
-  await assemble(modules);
+  const areMade = await Promise.all(MODULES.map((module) => isMade(module, WAYS.release, sources)));
+  if (quick && areMade.includes(false)) await buildQuick(sources);
+  else await buildAll(plain && !quick ? [...MODULES, PLAIN] : MODULES, sources);
   const size = (await stat(at('pkg/vesicle_bg.wasm'))).size;
   say('pkg', `${Math.round(size / 1000)} kB of wasm, ${((performance.now() - started) / 1000).toFixed(1)} s`);
+}
+
+async function buildAll(modules, sources) {
+  await Promise.all(modules.map((module) => make(module, WAYS.release, sources)));
+  if (modules.includes(PLAIN)) await compareGlue();
+  await assemble(modules);
+}
+
+/** The whole library stands in for its parts, which have the same classes. */
+async function buildQuick(sources) {
+  for (const module of [WHOLE, READERS]) await make(module, WAYS.quick, sources);
+  for (const module of METHOD_MODULES) {
+    await rm(folder(module), { recursive: true, force: true });
+    await cp(folder(WHOLE), folder(module), { recursive: true });
+  }
+  await assemble(MODULES);
 }
 
 if (startedAs(import.meta.url)) {

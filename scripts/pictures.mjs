@@ -28,6 +28,23 @@ export const PICTURES = [
     ...{ file: 'docs/coverage-default.jpg', type: 'jpeg', quality: 85, part: '.view', prepare: measureCoverage },
     hash: '#extract',
   },
+  // Noisy points with the paper's settings and with those chosen from them; a chamber with its muscles outside, and inside.
+  {
+    ...{ file: 'docs/noise-paper.jpg', type: 'jpeg', quality: 85, part: '.view' },
+    ...{ hash: '#reconstruct?example=two-balls', prepare: (page) => dropFor(page, `${PAPER_LINK}&v=2`, knot()) },
+  },
+  {
+    ...{ file: 'docs/noise-default.jpg', type: 'jpeg', quality: 85, part: '.view' },
+    ...{ hash: '#reconstruct?example=two-balls', prepare: (page) => dropFor(page, `${KNOT_LINK}&v=2`, knot()) },
+  },
+  {
+    ...{ file: 'docs/cavity-open.jpg', type: 'jpeg', quality: 85, part: '.view' },
+    hash: '#track?example=ventricle',
+  },
+  {
+    ...{ file: 'docs/cavity-closed.jpg', type: 'jpeg', quality: 85, part: '.view' },
+    hash: '#track?example=ventricle&cavity=closed',
+  },
   // Failures of the methods at the defaults, and a mesh of the user's before and after.
   {
     ...{ file: 'docs/fails-extract.jpg', type: 'jpeg', quality: 85, part: '.view' },
@@ -50,6 +67,10 @@ export const PICTURES = [
     ...{ hash: '#sculpt?example=globe', prepare: stopEllipsoid },
   },
 ];
+
+/** Link to points that are yet to be dropped, and the same with the paper's settings. */
+const KNOT_LINK = '#reconstruct?file=knot.xyz';
+const PAPER_LINK = `${KNOT_LINK}&p.delta=5&p.lambdaSurface=0.001&p.lambdaExterior=2&p.sides=outside`;
 
 /** Names of the controls and headings that a picture of the page shows, from top to bottom, without numbers. */
 export function visibleControls(page) {
@@ -105,6 +126,25 @@ async function bowl() {
   return { name: 'bowl.xyz', bytes: new TextEncoder().encode(text) };
 }
 
+/** Returns points on a tube along a trefoil knot, with noise of a tenth of its diameter. */
+async function knot() {
+  const random = randomNumbers(5);
+  const along = (t) => [Math.sin(t) + 2 * Math.sin(2 * t), Math.cos(t) - 2 * Math.cos(2 * t), -Math.sin(3 * t)];
+  const point = () => {
+    const t = 2 * Math.PI * random();
+    const [middle, ahead] = [along(t), along(t + 1e-3)];
+    const tangent = ahead.map((x, k) => x - middle[k]);
+    // A direction at random, without its part along the tube.
+    const free = [0, 1, 2].map(() => normalNumber(random));
+    const dot = (u, v) => u.reduce((sum, x, k) => sum + x * v[k], 0);
+    const away = free.map((x, k) => x - (dot(free, tangent) / dot(tangent, tangent)) * tangent[k]);
+    const length = Math.hypot(...away);
+    return middle.map((x, k) => x + (0.45 * away[k]) / length + 0.09 * normalNumber(random)).join(' ');
+  };
+  const text = Array.from({ length: 5000 }, point).join('\n');
+  return { name: 'knot.xyz', bytes: new TextEncoder().encode(text) };
+}
+
 async function bust() {
   return { name: 'bust.ply', bytes: await readFile(at('www/public/data/nefertiti.ply')) };
 }
@@ -124,6 +164,12 @@ async function dropData(page, data) {
   );
   await page.waitForFunction((name) => document.querySelector('.facts')?.textContent?.includes(name), name);
   await page.waitForSelector('[data-state=done]', { timeout: 120_000 });
+}
+
+/** Follows a link that waits for data, and drops these. */
+async function dropFor(page, hash, data) {
+  await page.evaluate((hash) => location.assign(hash), hash);
+  await dropData(page, data);
 }
 
 /** Opens a mesh, and moves an ellipsoid further than its surface can follow. */

@@ -14,8 +14,7 @@ async function listen() {
 
 await script(async () => {
   await setup({ browser: false });
-  // The app needs vector instructions.
-  await build({ plain: false });
+  await build({ quick: true });
   await buildApp();
   const { address } = await listen();
   say('ready', address);

@@ -1,10 +1,15 @@
 //! Bindings of the interpolation of slices.
 
+use std::future::Future;
+use std::pin::Pin;
+use std::task::Poll;
+
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::error::Failure;
 use super::volume::RawVolume;
-use vesicle::volume::Enrichment;
+use vesicle::pauses::{Pauses, advance};
+use vesicle::volume::{Enrichment, Volume, VolumeError};
 
 #[wasm_bindgen]
 impl RawVolume {
@@ -13,7 +18,33 @@ impl RawVolume {
     /// become nearly cubes.
     #[wasm_bindgen(js_name = enrichSlices)]
     pub fn enrich_slices(&self, factor: Option<usize>, flow: bool) -> Result<RawVolume, JsValue> {
-        let method = if flow { Enrichment::Flow } else { Enrichment::Linear };
-        Ok(RawVolume(self.0.enrich_slices(factor, method).map_err(Failure::from)?))
+        Ok(RawVolume(self.0.enrich_slices(factor, method(flow)).map_err(Failure::from)?))
     }
+}
+
+/// A volume in which slices are being interpolated.
+#[wasm_bindgen]
+pub struct RawEnrichment(Pin<Box<dyn Future<Output = Result<Volume, VolumeError>>>>);
+
+#[wasm_bindgen]
+impl RawEnrichment {
+    /// Begins what `enrichSlices` of `volume` does.
+    #[wasm_bindgen(constructor)]
+    pub fn new(volume: &RawVolume, factor: Option<usize>, flow: bool) -> RawEnrichment {
+        let volume = volume.0.clone();
+        let enriched = async move { volume.enrich_in_slices(factor, method(flow), &Pauses::default()).await };
+        RawEnrichment(Box::pin(enriched))
+    }
+
+    /// Does a slice of the work; returns the volume at the end, after which this must not be called any more.
+    pub fn advance(&mut self) -> Result<Option<RawVolume>, JsValue> {
+        match advance(&mut self.0) {
+            Poll::Pending => Ok(None),
+            Poll::Ready(volume) => Ok(Some(RawVolume(volume.map_err(Failure::from)?))),
+        }
+    }
+}
+
+fn method(flow: bool) -> Enrichment {
+    if flow { Enrichment::Flow } else { Enrichment::Linear }
 }

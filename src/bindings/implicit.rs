@@ -184,7 +184,7 @@ impl RawImplicit {
             duplicates: surface.duplicates(),
             outliers: surface.outliers(),
             spurious_components: surface.spurious_components(),
-            choice: surface.choice().copied(),
+            choice: surface.choice(),
             warning: surface.params().warning(),
         })?)
     }

@@ -179,6 +179,60 @@ impl From<Proposal> for ProposalCopy {
     }
 }
 
+/// Options of a tracker from the arguments of its constructor.
+fn options(
+    volume: &RawVolume,
+    corners: Option<Float64Array>,
+    voxels: Option<Vec<u32>>,
+    nearest: Option<Float64Array>,
+    start: Option<TriangleCopy>,
+    is_closed: bool,
+    params: &JsValue,
+) -> Result<TrackingOptions, JsValue> {
+    let numbers = |array: Option<Float64Array>| array.as_ref().map(doubles).transpose();
+    let world = |n: Vec<f64>| Bounds::World([DVec3::from_slice(&n), DVec3::from_slice(&n[3..])]);
+    let within = |n: Vec<u32>| Bounds::Voxels([0, 3].map(|k| [k, k + 1, k + 2].map(|i| n[i] as usize)));
+    Ok(TrackingOptions {
+        volume: volume.0.clone(),
+        bounds: numbers(corners)?.map(world).or(voxels.map(within)),
+        component: numbers(nearest)?
+            .map_or(Component::Largest, |n| Component::Nearest(DVec3::from_slice(&n))),
+        start: start.map(|mesh| mesh.0),
+        cavity: if is_closed { Cavity::Closed } else { Cavity::Open },
+        params: with_overrides(&TrackingParams::default(), params)?,
+    })
+}
+
+/// A tracker that is being created in slices.
+#[wasm_bindgen]
+pub struct RawTrackerCreation(Computation<Result<SurfaceTracker, MethodError>>);
+
+#[wasm_bindgen]
+impl RawTrackerCreation {
+    /// Begins to create the tracker that the constructor of `RawTracker` creates.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        volume: &RawVolume,
+        corners: Option<Float64Array>,
+        voxels: Option<Vec<u32>>,
+        nearest: Option<Float64Array>,
+        start: Option<TriangleCopy>,
+        is_closed: bool,
+        params: &JsValue,
+    ) -> Result<RawTrackerCreation, JsValue> {
+        let options = options(volume, corners, voxels, nearest, start, is_closed, params)?;
+        Ok(RawTrackerCreation(Box::pin(SurfaceTracker::new_in_slices(options))))
+    }
+
+    /// Does a slice of the work; returns the tracker at the end, after which this must not be called any more.
+    pub fn advance(&mut self) -> Result<Option<RawTracker>, JsValue> {
+        match advance(&mut self.0) {
+            Poll::Pending => Ok(None),
+            Poll::Ready(tracker) => Ok(Some(RawTracker::of(tracker.map_err(Failure::from)?))),
+        }
+    }
+}
+
 /// The raw handle of the TypeScript class `SurfaceTracker`, which shares the tracker with the live mesh of its surface.
 #[wasm_bindgen]
 pub struct RawTracker(Rc<RefCell<Tracking>>);
@@ -200,20 +254,9 @@ impl RawTracker {
         is_closed: bool,
         params: &JsValue,
     ) -> Result<RawTracker, JsValue> {
-        let numbers = |array: Option<Float64Array>| array.as_ref().map(doubles).transpose();
-        let world = |n: Vec<f64>| Bounds::World([DVec3::from_slice(&n), DVec3::from_slice(&n[3..])]);
-        let within = |n: Vec<u32>| Bounds::Voxels([0, 3].map(|k| [k, k + 1, k + 2].map(|i| n[i] as usize)));
-        let options = TrackingOptions {
-            volume: volume.0.clone(),
-            bounds: numbers(corners)?.map(world).or(voxels.map(within)),
-            component: numbers(nearest)?
-                .map_or(Component::Largest, |n| Component::Nearest(DVec3::from_slice(&n))),
-            start: start.map(|mesh| mesh.0),
-            cavity: if is_closed { Cavity::Closed } else { Cavity::Open },
-            params: with_overrides(&TrackingParams::default(), params)?,
-        };
+        let options = options(volume, corners, voxels, nearest, start, is_closed, params)?;
         let tracker = SurfaceTracker::new(options).map_err(Failure::from)?;
-        Ok(RawTracker(Rc::new(RefCell::new(Tracking::new(tracker)))))
+        Ok(RawTracker::of(tracker))
     }
 
     /// Makes `iterations` steps, or fewer if the tracker is done before; returns the `StepReport` of the last step, with the
@@ -336,6 +379,12 @@ impl RawTracker {
         let tracker = tracking.ready();
         tracker.meshes().iter().try_for_each(|mesh| animation.add(mesh)).map_err(Failure::from)?;
         Ok(animation.finish(frame_seconds).map_err(Failure::from)?)
+    }
+}
+
+impl RawTracker {
+    fn of(tracker: SurfaceTracker) -> Self {
+        Self(Rc::new(RefCell::new(Tracking::new(tracker))))
     }
 }
 

@@ -7,6 +7,7 @@ use super::flow::{Flow, Image, symmetric_flow};
 use super::voxels::Voxels;
 use super::{Volume, VolumeInit};
 use crate::math::{DAffine3, DVec3};
+use crate::pauses::{Pauses, finished};
 
 /// Interpolation method of [`Volume::enrich_slices`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,6 +35,19 @@ impl Volume {
     /// # Errors
     /// `factor` not in 1..=16; a single slice along that axis with a factor above 1; [`VolumeError::TooLarge`].
     pub fn enrich_slices(&self, factor: Option<usize>, method: Enrichment) -> Result<Volume, VolumeError> {
+        finished(self.enrich_in_slices(factor, method, &Pauses::default()))
+    }
+
+    /// As [`Self::enrich_slices`], with a pause after each image that is interpolated.
+    ///
+    /// # Errors
+    /// Those of [`Self::enrich_slices`].
+    pub async fn enrich_in_slices(
+        &self,
+        factor: Option<usize>,
+        method: Enrichment,
+        pauses: &Pauses,
+    ) -> Result<Volume, VolumeError> {
         let axis = self.thick_axis();
         let factor = factor.unwrap_or_else(|| self.isotropic_factor(axis));
         if !(1..=MAX_FACTOR).contains(&factor) {
@@ -52,7 +66,7 @@ impl Volume {
         dims[axis] = (count - 1) * factor + 1;
         let mut frames = reserve(self.frames())?;
         for frame in 0..self.frames() {
-            frames.push(self.enriched_frame(frame, axis, factor, method)?);
+            frames.push(self.enriched_frame(frame, axis, factor, method, pauses).await?);
         }
         let parts: Vec<&Voxels> = frames.iter().collect();
         let voxels = Voxels::concatenate(&parts)?.unwrap_or(Voxels::F32(Vec::new()));
@@ -86,12 +100,13 @@ impl Volume {
 
     /// Returns one frame, as stored values, with `factor` − 1 slices interpolated between each pair of neighbouring
     /// slices along `axis`.
-    fn enriched_frame(
+    async fn enriched_frame(
         &self,
         frame: usize,
         axis: usize,
         factor: usize,
         method: Enrichment,
+        pauses: &Pauses,
     ) -> Result<Voxels, VolumeError> {
         let dims = self.dims();
         let slices = Slices::new(dims, axis);
@@ -112,13 +127,17 @@ impl Volume {
                 break;
             }
             let after = slices.image(slice + 1, &intensities)?;
+            pauses.now().await;
             let flow = match method {
-                Enrichment::Flow => {
-                    Some(weighted_by_confidence(&before, &after, symmetric_flow(&before, &after)?)?)
-                }
+                Enrichment::Flow => Some(weighted_by_confidence(
+                    &before,
+                    &after,
+                    symmetric_flow(&before, &after, pauses).await?,
+                )?),
                 Enrichment::Linear => None,
             };
             for step in 1..factor {
+                pauses.now().await;
                 let image = in_between(&before, &after, flow.as_ref(), step as f32 / factor as f32)?;
                 let made = image.values.iter().map(|&value| self.stored(f64::from(value)));
                 out.voxel_indices(slice * factor + step).zip(made).for_each(|(at, value)| values[at] = value);

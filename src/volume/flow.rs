@@ -6,6 +6,7 @@
 
 use super::error::{VolumeError, reserve};
 use super::sampling::locate;
+use crate::pauses::Pauses;
 
 /// Radius of the least-squares window of the optical flow, in pixels: one flow vector explains all differences within
 /// (2 `RADIUS` + 1)² pixels.
@@ -194,11 +195,12 @@ fn between(x: f32, n: usize) -> (usize, usize, f32) {
     (index, if index + 1 < n { index + 1 } else { index }, share)
 }
 
-/// Returns the symmetric optical flow between two images of one size; used for interpolated slices.
+/// Returns the symmetric optical flow between two images of one size; used for interpolated slices. Pauses before each
+/// iteration.
 ///
 /// # Errors
 /// [`VolumeError::TooLarge`].
-pub(super) fn symmetric_flow(a: &Image, b: &Image) -> Result<Flow, VolumeError> {
+pub(super) async fn symmetric_flow(a: &Image, b: &Image, pauses: &Pauses) -> Result<Flow, VolumeError> {
     let mut levels = vec![(a.clone(), b.clone())];
     while let Some((a, b)) = levels.last()
         && levels.len() < MAX_LEVELS
@@ -214,6 +216,7 @@ pub(super) fn symmetric_flow(a: &Image, b: &Image) -> Result<Flow, VolumeError> 
             flow = Flow { x: flow.x.doubled(a.width, a.height)?, y: flow.y.doubled(a.width, a.height)? };
         }
         for _ in 0..if level == 0 && levels.len() > 1 { FINEST_ITERATIONS } else { ITERATIONS } {
+            pauses.now().await;
             iterate(a, b, &mut flow)?;
         }
     }
@@ -301,8 +304,13 @@ impl NormalEquations {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn flow_of(a: &Image, b: &Image) -> Flow {
+        finished(symmetric_flow(a, b, &Pauses::default())).unwrap()
+    }
 
     /// Returns an image of a disc with a smooth edge.
     fn disc(center: [f32; 2], radius: f32) -> Image {
@@ -317,7 +325,7 @@ mod tests {
     #[test]
     fn what_has_moved_is_followed_halfway_from_both_sides() {
         let (a, b) = (disc([28.0, 24.0], 9.0), disc([34.0, 21.0], 9.0));
-        let flow = symmetric_flow(&a, &b).unwrap();
+        let flow = flow_of(&a, &b);
         // Pixels on the rim of the midpoint disc.
         for (x, y) in [(31 + 9, 22), (31 - 9, 23), (31, 22 + 9), (31, 23 - 9)] {
             let (u, v) = (flow.x.values[y * 64 + x], flow.y.values[y * 64 + x]);
@@ -332,7 +340,7 @@ mod tests {
     #[test]
     fn equal_or_constant_images_have_no_flow() {
         for image in [disc([30.0, 20.0], 8.0), Image::flat(64, 48, 3.0).unwrap()] {
-            let flow = symmetric_flow(&image, &image).unwrap();
+            let flow = flow_of(&image, &image);
             assert!(flow.x.values.iter().chain(&flow.y.values).all(|u| *u == 0.0));
         }
     }
@@ -342,7 +350,7 @@ mod tests {
         for (width, height) in [(1, 1), (1, 9), (200, 1)] {
             let image = Image::flat(width, height, 1.0).unwrap();
             let other = Image::flat(width, height, 2.0).unwrap();
-            assert_eq!(symmetric_flow(&image, &other).unwrap().x.values, vec![0.0; width * height]);
+            assert_eq!(flow_of(&image, &other).x.values, vec![0.0; width * height]);
         }
     }
 

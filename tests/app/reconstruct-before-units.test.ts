@@ -21,7 +21,7 @@ test('links to examples state the values of the paper by the examples, with or w
 });
 
 test('a new link to a file leads to the same parameters', () => {
-  const defaults = { delta: 'auto', lambdaSurface: 'auto', lambdaExterior: 'auto', sides: 'both', tau: 0.025 };
+  const defaults = { delta: 'auto', lambdaSurface: 'auto', lambdaExterior: 'auto', sides: 'auto', tau: 0.025 };
   const choice = { maxPoints: undefined, keepComponents: undefined };
   const usual = { example: undefined, file: 'a.xyz', choice, defaults, edits: NONE, size: 1 };
   for (const changed of [{}, PAPER, { lambdaSurface: 0.004 }]) {

@@ -1,12 +1,15 @@
 //! The implicit surface with parameters that it chooses from its points.
 
+use super::common::Random;
 use super::common::euler_of_parts;
-use super::common::points::{Shape, noisy, pair, sphere, torus};
+use super::common::points::{Shape, direction, noisy, normal, pair, sphere, torus};
 use std::f64::consts::PI;
-use vesicle::math::Vec3;
+use vesicle::math::{DVec3, Vec3};
 use vesicle::mesh::{measure, report};
 use vesicle::methods::Auto;
-use vesicle::methods::implicit::{Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits};
+use vesicle::methods::implicit::{
+    Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits, Sides,
+};
 use vesicle::warning::WarningCode;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -46,7 +49,7 @@ fn noise_is_measured_and_lambda_grows_with_it() {
         while surface.choice().is_none() {
             surface.step().unwrap();
         }
-        let choice = *surface.choice().unwrap();
+        let choice = surface.choice().unwrap();
         assert!((choice.noise - noise).abs() < 0.3 * noise + 1e-3, "{noise}: {choice:?}");
         choice
     });
@@ -196,7 +199,7 @@ fn lambda_that_is_chosen_may_be_given_for_many_points() {
             surface.step().unwrap();
         }
         while surface.step().unwrap().phase != "extract" {}
-        (*surface.choice().unwrap(), surface.evaluate(&[Vec3::ZERO, Vec3::X * 1.1]).unwrap())
+        (surface.choice().unwrap(), surface.evaluate(&[Vec3::ZERO, Vec3::X * 1.1]).unwrap())
     };
     let (chosen, values) = choice(ImplicitParams::default());
     let length = 0.5 / chosen.density.sqrt() + 0.5 * chosen.noise;
@@ -214,7 +217,7 @@ fn the_same_settings_give_the_same_bits_however_they_are_reached() {
     let edits = PointEdits { removed: (0..40).collect(), ..PointEdits::default() };
     let direct = finished(points.clone());
     let mut other = begun_on_paper(Cloud { points: points.clone(), ..Cloud::default() });
-    let choice = *direct.choice().unwrap();
+    let choice = direct.choice().unwrap();
     let [delta, lambda_surface, lambda_exterior] =
         [choice.delta, choice.lambda_surface, choice.lambda_exterior].map(Auto::Given);
     other
@@ -288,4 +291,76 @@ fn settings_may_change_while_constraints_are_made() {
         finish(&mut other);
         assert!(other.surface() == direct.surface(), "with a surface before: {has_surface}");
     }
+}
+
+/// Points on both sides of a bowl whose wall is five times as thick as their noise.
+fn bowl(count: usize) -> Cloud {
+    let mut random = Random(7);
+    let mut point = |i: usize| {
+        let on_sphere = direction(&mut random);
+        let below = DVec3 { z: -on_sphere.z.abs(), ..on_sphere };
+        let noise = [0; 3].map(|_| 0.02 * normal(&mut random));
+        (below * [1.0, 0.9][i % 2] + DVec3::from(noise)).as_vec3()
+    };
+    Cloud { points: (0..count).map(&mut point).collect(), ..Cloud::default() }
+}
+
+/// Where the sides are confused, constraints on both fill the bowl.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn where_sides_are_ambiguous_the_surface_that_the_points_are_nearer_to_is_taken() {
+    let [auto, both] = [Sides::Auto, Sides::Both].map(|sides| {
+        let params = ImplicitParams { sides, ..ImplicitParams::default() };
+        let options = ImplicitOptions { params, ..ImplicitOptions::default() };
+        let mut surface = ImplicitSurface::new(bowl(5000), options).unwrap();
+        finish(&mut surface);
+        assert!(surface.step().unwrap().warnings.iter().any(|one| one.code == WarningCode::ThinParts));
+        surface
+    });
+    assert_eq!(
+        [&auto, &both].map(|one| one.choice().unwrap().sides),
+        [Some(Sides::Outside), Some(Sides::Both)]
+    );
+    assert!(auto.fitness().unwrap().rms < 0.9 * both.fitness().unwrap().rms);
+    let truth = BALL / 2.0 * (1.0 - 0.9 * 0.9 * 0.9);
+    let off = [&auto, &both].map(|one| (volume(one) / truth - 1.0).abs());
+    assert!(off[0] < 0.15 && off[1] > 0.5, "{off:?}");
+}
+
+/// The choice does not depend on edits and other parameters, nor on where the run was saved.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn the_choice_of_sides_is_the_same_however_settings_are_reached() {
+    let cloud = bowl(2000);
+    let edits = PointEdits { removed: (0..40).collect(), ..PointEdits::default() };
+    let params = ImplicitParams { tau: 0.04, ..ImplicitParams::default() };
+    let mut direct = begun(cloud.clone());
+    direct.set_params(params.clone()).unwrap();
+    direct.set_edits(edits.clone()).unwrap();
+    finish(&mut direct);
+    let mut other = begun(cloud.clone());
+    let mut slices = 0;
+    loop {
+        let phase = other.step().unwrap().phase;
+        slices += usize::from(phase == "constraints");
+        if phase == "solve" {
+            break;
+        }
+        if phase == "constraints" && slices % 60 == 59 {
+            let mut resumed = begun(cloud.clone());
+            resumed.restore(&other.save()).unwrap();
+            assert_eq!(resumed.save(), other.save(), "after {slices} slices");
+            other = resumed;
+        }
+    }
+    assert!(slices > 100, "{slices}");
+    other.set_edits(edits).unwrap();
+    other.set_params(params).unwrap();
+    finish(&mut other);
+    assert_eq!(other.choice(), direct.choice());
+    assert!(other.surface() == direct.surface());
+    let last = other.save();
+    let mut resumed = begun(cloud);
+    resumed.restore(&last).unwrap();
+    assert_eq!(resumed.save(), last);
 }

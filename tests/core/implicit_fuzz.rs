@@ -112,7 +112,7 @@ fn params(random: &mut Random) -> ImplicitParams {
             2 => KernelKind::Gaussian,
             _ => usual.kernel,
         },
-        sides: if random.below(3) == 0 { Sides::Both } else { Sides::Outside },
+        sides: [Sides::Auto, Sides::Both, Sides::Outside, Sides::Outside][random.below(4)],
     }
 }
 

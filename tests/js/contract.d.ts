@@ -377,7 +377,7 @@ export interface ImplicitParams {
   tolerance?: number; // relative residual of the solve
   cell?: number; // edge of an extraction cell, in points' units; default from the sampling
   level?: 'zero' | 'mean';
-  sides?: 'both' | 'outside';
+  sides?: 'auto' | 'both' | 'outside';
 }
 export class ImplicitSurface implements Stepper {
   constructor(options: {

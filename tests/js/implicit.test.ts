@@ -281,7 +281,7 @@ const PAPER = { delta: 5, lambdaSurface: 0.001, lambdaExterior: 2, sides: 'outsi
 test('by default, parameters are chosen from the points, and said', async () => {
   const chosen = surface();
   expect(chosen.choice).toBeUndefined();
-  const automatic = { delta: 'auto', lambdaSurface: 'auto', lambdaExterior: 'auto', sides: 'both' };
+  const automatic = { delta: 'auto', lambdaSurface: 'auto', lambdaExterior: 'auto', sides: 'auto' };
   expect(chosen.params).toMatchObject(automatic);
   const { done } = await chosen.run();
   expect(done).toBe(true);

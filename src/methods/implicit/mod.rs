@@ -50,6 +50,7 @@ mod params;
 mod point_colors;
 mod queries;
 mod sampling;
+mod sides_trial;
 mod solve;
 mod state;
 
@@ -76,6 +77,7 @@ use field::Field;
 use kernel::{Kernel, KernelTable};
 use point_colors::PointColors;
 use sampling::{Samples, Sampling};
+use sides_trial::SidesTrial;
 use solve::{Constraints, Solution, Solver};
 
 /// Options of an [`ImplicitSurface`], given to [`ImplicitSurface::new`] together with its points.
@@ -133,6 +135,8 @@ pub struct ImplicitSurface {
     edits: PointEdits,
     samples: Option<Samples>,
     exterior: Option<Exterior>,
+    /// The sides in force: those of the parameter, or else those chosen; `None` before there are constraints.
+    sides: Option<Sides>,
     /// Whether inside and outside are ambiguous; see [`OffSurface::is_ambiguous`](automatic::OffSurface::is_ambiguous).
     ambiguous_sides: bool,
     /// The current constraints on the implicit function, made from samples, exterior points and edits.
@@ -187,12 +191,28 @@ impl Solved {
 /// The stage of the reconstruction that the next call of [`ImplicitSurface::step`] works on, with its data.
 enum Stage {
     Subsample(Box<Sampling>),
-    /// The search for points off the surface; `None` before it, or without one.
-    Constrain(Option<Box<OffSurfaceSearch>>),
+    /// The choice of points off the surface; `None` before it, or without one.
+    Constrain(Option<Constraining>),
     Solve(Box<Solver>),
     Extract(Box<Extraction>),
     Color(Box<ColoringState>),
     Done,
+}
+
+/// The choice of points off the surface.
+enum Constraining {
+    Search(Box<OffSurfaceSearch>),
+    /// The choice of the sides where these are ambiguous.
+    Trial(Box<SidesTrial>),
+}
+
+impl Constraining {
+    fn progress(&self) -> f64 {
+        match self {
+            Self::Search(search) => 0.5 * search.progress(),
+            Self::Trial(trial) => 0.5 + 0.5 * trial.progress(),
+        }
+    }
 }
 
 /// The extracted mesh while it is being coloured.
@@ -264,6 +284,7 @@ impl ImplicitSurface {
             edits: PointEdits::default(),
             samples: None,
             exterior: None,
+            sides: None,
             ambiguous_sides: false,
             constraints: Constraints::default(),
             stage: first_stage(&options),
@@ -316,7 +337,7 @@ impl ImplicitSurface {
         let (before, slices) = (stage.phase(), std::mem::take(&mut self.slices));
         self.stage = match stage {
             Stage::Subsample(sampling) => self.subsample(sampling)?,
-            Stage::Constrain(search) => self.constrain(search)?,
+            Stage::Constrain(state) => self.constrain(state)?,
             Stage::Solve(solver) => self.solve(solver)?,
             Stage::Extract(extraction) => self.extract(extraction)?,
             Stage::Color(state) => self.color(*state),
@@ -347,13 +368,13 @@ impl ImplicitSurface {
     }
 
     fn warnings(&self) -> Vec<Warning> {
-        let sides = "inside and outside are ambiguous: walls or gaps are about as thin as the spacing of the points or their \
+        let ambiguous = "inside and outside are ambiguous: walls or gaps are about as thin as the spacing of the points or their \
                      noise; components, handles and volume may be wrong";
         let outliers = "a few points are so far away that the others are a small part of the box: cells are too large for the \
                         object, and there may be no surface; keep only the largest cluster of points, or remove those points";
         let found = [
             (self.has_far_outliers(), WarningCode::Outliers, outliers),
-            (self.ambiguous_sides && self.is_two_sided(), WarningCode::ThinParts, sides),
+            (self.ambiguous_sides && self.params.sides != Sides::Outside, WarningCode::ThinParts, ambiguous),
         ];
         found.into_iter().filter(|one| one.0).map(|(_, code, text)| Warning::new(code, text)).collect()
     }
@@ -368,8 +389,8 @@ impl ImplicitSurface {
     }
 
     /// Makes the constraints, of which those off the surface take several slices.
-    fn constrain(&mut self, search: Option<Box<OffSurfaceSearch>>) -> Result<Stage, MethodError> {
-        Ok(match self.make_constraints(search)? {
+    fn constrain(&mut self, state: Option<Constraining>) -> Result<Stage, MethodError> {
+        Ok(match self.make_constraints(state)? {
             None if self.exterior.is_none() => first_stage(&self.options),
             None => self.begin_solve(),
             unfinished => Stage::Constrain(unfinished),
@@ -377,35 +398,39 @@ impl ImplicitSurface {
     }
 
     /// Does a slice of making the exterior points and, at the end, the constraints on the implicit function from these, the
-    /// samples and the edits; returns the search if it is unfinished. Does nothing before the samples are selected.
-    fn make_constraints(
-        &mut self,
-        search: Option<Box<OffSurfaceSearch>>,
-    ) -> Result<Option<Box<OffSurfaceSearch>>, MethodError> {
+    /// samples and the edits; returns its state if it is unfinished. Does nothing before the samples are selected.
+    fn make_constraints(&mut self, state: Option<Constraining>) -> Result<Option<Constraining>, MethodError> {
         let Some(samples) = &self.samples else { return Ok(None) };
-        let exterior = match search {
-            _ if !self.is_two_sided() => self.exterior_points(samples),
+        let (sides, exterior) = match state {
+            _ if self.params.sides == Sides::Outside => (Sides::Outside, self.exterior_points(samples)),
             None => {
                 let search = OffSurfaceSearch::new(samples, SEED);
-                return Ok(Some(Box::new(search)));
+                return Ok(Some(Constraining::Search(Box::new(search))));
             }
-            Some(mut search) => {
-                let Some(found) = search.advance() else { return Ok(Some(search)) };
+            Some(Constraining::Search(mut search)) => {
+                let Some(found) = search.advance() else { return Ok(Some(Constraining::Search(search))) };
                 let known = self.known_outside(samples);
                 let share = search.outside_share(&known.near);
                 let contradict = share < AGREEMENT && share > 1.0 - AGREEMENT;
                 self.ambiguous_sides = found.is_ambiguous() || contradict;
-                known.with_both_sides(found, share)
+                let both = known.with_both_sides(found, share);
+                if self.ambiguous_sides && self.params.sides == Sides::Auto {
+                    let trial = SidesTrial::new(samples, self.map, both, self.exterior_points(samples));
+                    return Ok(Some(Constraining::Trial(Box::new(trial))));
+                }
+                (Sides::Both, both)
+            }
+            Some(Constraining::Trial(mut trial)) => {
+                let Some(chosen) = trial.advance(samples) else {
+                    return Ok(Some(Constraining::Trial(trial)));
+                };
+                chosen
             }
         };
         let constraints = self.edits.constraints(samples, &exterior, &self.original, &self.map)?;
         self.constraints = self.regularized(constraints);
-        self.exterior = Some(exterior);
+        (self.sides, self.exterior) = (Some(sides), Some(exterior));
         Ok(None)
-    }
-
-    fn is_two_sided(&self) -> bool {
-        self.params.sides == Sides::Both
     }
 
     /// Returns the points outside that the caller gave or that cameras show, if there are any.
@@ -434,14 +459,14 @@ impl ImplicitSurface {
 
     /// Returns measures of the sampled points, and the values chosen by them for parameters that are `auto`; `None` before
     /// they are sampled.
-    pub fn choice(&self) -> Option<&Choice> {
-        self.samples.as_ref().map(|samples| &samples.choice)
+    pub fn choice(&self) -> Option<Choice> {
+        self.samples.as_ref().map(|samples| Choice { sides: self.sides, ..samples.choice })
     }
 
     /// Returns the values in force: those given, or else those chosen; 0 before the samples are selected, when nothing is
     /// made with them.
     fn in_force(&self) -> Choice {
-        let chosen = self.choice().copied().unwrap_or_default();
+        let chosen = self.choice().unwrap_or_default();
         let ImplicitParams { delta, lambda_surface, lambda_exterior, .. } = self.params;
         Choice {
             delta: delta.given().unwrap_or(chosen.delta),
@@ -529,8 +554,14 @@ impl ImplicitSurface {
         let Some(solved) = &self.solved else { return Ok(first_stage(&self.options)) };
         let points = self.in_world(&self.constraints.centres[..self.constraints.surface]);
         let level = self.iso_value(solved);
-        let extraction =
-            Extraction::new(&solved.field, self.map, level, &points, self.cell(), !self.is_two_sided())?;
+        let extraction = Extraction::new(
+            &solved.field,
+            self.map,
+            level,
+            &points,
+            self.cell(),
+            self.sides == Some(Sides::Outside),
+        )?;
         Ok(Stage::Extract(Box::new(extraction)))
     }
 
@@ -614,7 +645,7 @@ impl ImplicitSurface {
         let (now, only_extraction) = (&self.params, before.with_extraction_of(&self.params));
         if before.sides != now.sides && !matches!(self.stage, Stage::Subsample(_)) {
             // Without them, edits in the meantime wait for the new ones.
-            self.exterior = None;
+            (self.sides, self.exterior) = (None, None);
             (self.stage, self.slices) = (Stage::Constrain(None), 0);
         }
         if before == *now || matches!(self.stage, Stage::Subsample(_) | Stage::Constrain(_)) {
@@ -741,7 +772,7 @@ impl Stage {
     fn progress(&self, cameras: usize) -> f64 {
         match self {
             Self::Subsample(sampling) => sampling.progress(),
-            Self::Constrain(search) => search.as_ref().map_or(0.0, |search| search.progress()),
+            Self::Constrain(state) => state.as_ref().map_or(0.0, Constraining::progress),
             Self::Solve(solver) => solver.progress(),
             Self::Extract(extraction) => extraction.progress(),
             Self::Color(state) => state.camera as f64 / (cameras + 1) as f64,

@@ -96,10 +96,11 @@ parameters! {
             help: "Value of f at the surface: zero is the paper's; mean is the mean of f at the points, which lie slightly outside the zero set.",
         },
         /// The sides of the surface on which there are constraints besides those on it.
-        pub sides: Sides = Sides::Both => {
+        pub sides: Sides = Sides::Auto => {
             name: "sides",
             label: "Constraints off the surface",
-            help: "On both sides, noise does not shrink the surface; outside only is the paper's.",
+            help: "On both sides, noise does not shrink the surface; outside only is the paper's. Auto: both, unless these are ambiguous and the points fit better with those outside.",
+            choices: &["auto", "both", "outside"],
         },
     }
 }
@@ -137,6 +138,8 @@ choices! {
         Both = "both",
         /// Outside only, as in Dinh, Turk & Slabaugh.
         Outside = "outside",
+        /// Both, unless the points do not tell them apart, and are nearer to the surface with constraints outside only.
+        Auto = "auto",
     }
 }
 

@@ -232,6 +232,15 @@ impl SurfaceTracker {
     /// below a tenth of a voxel; [`MethodError::Mesh`] for a start that is not a closed surface, or intersects itself;
     /// [`MethodError::Volume`] if a frame does not fit into memory.
     pub fn new(options: TrackingOptions) -> Result<Self, MethodError> {
+        finished(Self::new_in_slices(options))
+    }
+
+    /// As [`Self::new`], with a pause after each frame that is read.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub async fn new_in_slices(options: TrackingOptions) -> Result<Self, MethodError> {
+        let pauses = Pauses::default();
         let TrackingOptions { volume, bounds, component, start, cavity, params } = options;
         params.validate()?;
         if volume.frames() < 2 {
@@ -239,7 +248,7 @@ impl SurfaceTracker {
             return Err(MethodError::invalid("volume", problem));
         }
         let shortest_side = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
-        let region = Region::new(&volume, bounds)?;
+        let region = Region::new(&volume, bounds, &pauses).await?;
         let noise = region.noise() * region.quantum;
         let image = ImageStatistics {
             shortest_side,

@@ -5,6 +5,7 @@ use super::vote::TIME;
 use super::working_space::WorkingSpace;
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::methods::MethodError;
+use crate::pauses::Pauses;
 use crate::volume::{Volume, Voxels, trilinear};
 
 /// Highest quantised intensity: intensities are quantised to 0 to 254, one byte per voxel.
@@ -90,7 +91,7 @@ impl Region {
     /// # Errors
     /// [`MethodError::InvalidArgument`] for voxel axes that are not at right angles, a box outside the volume, too few
     /// voxels, too many, or no contrast; [`MethodError::Volume`] if a frame does not fit into memory.
-    pub fn new(volume: &Volume, bounds: Option<Bounds>) -> Result<Self, MethodError> {
+    pub async fn new(volume: &Volume, bounds: Option<Bounds>, pauses: &Pauses) -> Result<Self, MethodError> {
         let spacing = DVec3::from(volume.spacing());
         let axes = volume.affine().matrix3;
         let directions =
@@ -121,20 +122,21 @@ impl Region {
             has_background: false,
             is_blank: Vec::new(),
         };
-        region.read(volume, low)?;
+        region.read(volume, low, pauses).await?;
         Ok(region)
     }
 
     /// Quantises the intensities of all frames, between the quantiles found by [`intensity_quantiles`], to one byte.
-    fn read(&mut self, volume: &Volume, low: [usize; 3]) -> Result<(), MethodError> {
+    async fn read(&mut self, volume: &Volume, low: [usize; 3], pauses: &Pauses) -> Result<(), MethodError> {
         let mut counts = vec![0u64; BINS];
         for frame in 0..volume.frames() {
+            pauses.now().await;
             self.for_each_row(volume, low, frame, |row| {
                 row.iter().filter(|v| !v.is_nan()).for_each(|&v| counts[bin_of(v)] += 1);
             })?;
         }
         let [mut from, to] = intensity_quantiles(&counts);
-        self.has_background = self.is_background_missing(volume, low, [from, to])?;
+        self.has_background = self.is_background_missing(volume, low, [from, to], pauses).await?;
         if self.has_background {
             // The step from the background to the darkest voxels is as large as all others together.
             from -= if to > from { to - from } else { 1.0 };
@@ -149,6 +151,7 @@ impl Region {
             ((v - from) * scale + 0.5).clamp(0.0, MAX_LEVEL) as u8
         };
         for frame in 0..volume.frames() {
+            pauses.now().await;
             let mut levels = Vec::with_capacity(self.dims.iter().product());
             self.for_each_row(volume, low, frame, |row| levels.extend(row.iter().map(|&v| level(v))))?;
             self.is_blank.push(levels.windows(2).all(|pair| pair[0] == pair[1]));
@@ -161,11 +164,12 @@ impl Region {
     /// Returns whether voxels that are not numbers are the background of the objects, so that the step to them counts as a
     /// boundary: those next to them are as bright as others. Next to a mask in the background of the image they are; there
     /// the step counts for nothing. `range` are the quantiles of the other intensities.
-    fn is_background_missing(
+    async fn is_background_missing(
         &self,
         volume: &Volume,
         low: [usize; 3],
         [from, to]: [f64; 2],
+        pauses: &Pauses,
     ) -> Result<bool, MethodError> {
         if !is_float(volume) {
             return Ok(false);
@@ -174,6 +178,7 @@ impl Region {
         let (mut sum, mut count) = (0.0, 0.0);
         let (mut all, mut all_count) = (0.0, 0.0);
         for frame in 0..volume.frames() {
+            pauses.now().await;
             let mut values: Vec<f32> = Vec::with_capacity(self.dims.iter().product());
             self.for_each_row(volume, low, frame, |row| values.extend(row))?;
             if !values.iter().any(|value| value.is_nan()) {

@@ -41,10 +41,11 @@ export function programOf(
 }
 
 /** Returns what the model chose from the points, in a sentence for people who read the code. */
-function remarkOn({ noise, delta, lambdaSurface, lambdaExterior }: ImplicitChoice): string {
-  const values = Object.entries({ noise, delta, lambdaSurface, lambdaExterior });
-  const list = values.map(([name, value]) => `${name} ${Number(value.toPrecision(3))}`).join(', ');
-  return text('reconstruct.chosenInCode', { list });
+function remarkOn({ noise, delta, lambdaSurface, lambdaExterior, sides }: ImplicitChoice): string {
+  const numbers = Object.entries({ noise, delta, lambdaSurface, lambdaExterior });
+  const list = numbers.map(([name, value]) => `${name} ${Number(value.toPrecision(3))}`);
+  if (sides) list.push(`sides ${sides}`);
+  return text('reconstruct.chosenInCode', { list: list.join(', ') });
 }
 
 /** Returns computed points as text, three coordinates a line; refuses if they are of a file, which the code reads. */

@@ -10,6 +10,7 @@ mod winding;
 
 pub use off_surface::{OffSurface, OffSurfaceSearch};
 
+use super::params::Sides;
 use super::solve::crowding;
 use crate::math::order::median;
 use crate::math::{Vec3, lower};
@@ -49,6 +50,9 @@ pub struct Choice {
     pub lambda_exterior: f64,
     /// First-order smoothness δ.
     pub delta: f64,
+    /// The sides of the surface that have constraints; `None` until they are chosen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sides: Option<Sides>,
 }
 
 impl Choice {
@@ -86,6 +90,7 @@ impl Choice {
             lambda_surface: lambda_surface / crowding(count),
             lambda_exterior: bounded(SOFTNESS[0] * lambda_surface, SOFTNESS[1]),
             delta: bounded(SMOOTHNESS[0] * density.sqrt(), SMOOTHNESS[1]),
+            sides: None,
         }
     }
 }
