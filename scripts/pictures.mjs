@@ -3,6 +3,8 @@
 import { mkdir, readFile, writeFile } from 'node:fs/promises';
 import { normalNumber, randomNumbers } from '../bench/random.mjs';
 import { launchChromium } from './chromium.mjs';
+import { SHAPES, surfaceOf } from './made-shapes.mjs';
+import { sampled } from './real-clouds.mjs';
 import { serveApp } from './serve.mjs';
 import { at, say, script, startedAs } from './shell.mjs';
 
@@ -39,11 +41,11 @@ export const PICTURES = [
   },
   {
     ...{ file: 'docs/cavity-open.jpg', type: 'jpeg', quality: 85, part: '.view' },
-    hash: '#track?example=ventricle',
+    hash: '#track?example=thick-slices',
   },
   {
     ...{ file: 'docs/cavity-closed.jpg', type: 'jpeg', quality: 85, part: '.view' },
-    hash: '#track?example=ventricle&cavity=closed',
+    hash: '#track?example=thick-slices&cavity=closed',
   },
   // Failures of the methods at the defaults, and a mesh of the user's before and after.
   {
@@ -52,7 +54,7 @@ export const PICTURES = [
   },
   {
     ...{ file: 'docs/fails-reconstruct.jpg', type: 'jpeg', quality: 85, part: '.view' },
-    ...{ hash: '#reconstruct?example=two-balls', prepare: (page) => dropData(page, bowl()) },
+    ...{ hash: '#reconstruct?example=two-balls', prepare: (page) => dropData(page, star()) },
   },
   {
     ...{ file: 'docs/fails-track.jpg', type: 'jpeg', quality: 85, part: '.view' },
@@ -111,19 +113,15 @@ async function plate() {
   return { name: 'plate.nii', bytes: new Volume({ data, dims: [size, size, size] }).toNifti() };
 }
 
-/** Returns points on both sides of a bowl whose wall is five times as thick as their noise. */
-async function bowl() {
-  const random = randomNumbers(7);
-  const point = (_, index) => {
-    const [height, turn] = [-random(), 2 * Math.PI * random()];
-    const flat = Math.sqrt(1 - height ** 2);
-    const radius = index % 2 === 0 ? 1 : 0.9;
-    return [flat * Math.cos(turn), flat * Math.sin(turn), height]
-      .map((x) => radius * x + 0.02 * normalNumber(random))
-      .join(' ');
-  };
-  const text = Array.from({ length: 5000 }, point).join('\n');
-  return { name: 'bowl.xyz', bytes: new TextEncoder().encode(text) };
+/** Returns points on a star of blades about as thin as their noise. */
+async function star() {
+  const library = await import('../pkg/index.js');
+  await library.default();
+  const mesh = surfaceOf(library, SHAPES.star());
+  const { points } = sampled(mesh, { noise: 0.01, seed: 2 });
+  mesh.free();
+  const lines = Array.from({ length: points.length / 3 }, (_, i) => points.subarray(3 * i, 3 * i + 3).join(' '));
+  return { name: 'star.xyz', bytes: new TextEncoder().encode(lines.join('\n')) };
 }
 
 /** Returns points on a tube along a trefoil knot, with noise of a tenth of its diameter. */
