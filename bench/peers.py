@@ -95,9 +95,66 @@ def flying_edges(voxels, spacing, iso):
 
 
 def vtk(job):
+    if "labels" in job:
+        yield from vtk_tools(job)
+        return
     milliseconds, found = best(job["cheapRepeats"], flying_edges(*read_volume(job["scan"]), job["iso"]))
     counts = {"vertices": found.GetNumberOfPoints(), "triangles": found.GetNumberOfPolys()}
     yield {"task": "cubes", "what": "flying edges", "milliseconds": milliseconds, **counts}
+
+
+def vtk_tools(job):
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyData
+    from vtkmodules.vtkFiltersCore import vtkQuadricDecimation, vtkSurfaceNets3D
+
+    import numpy
+
+    side = job["labels"]["side"]
+    labels = numpy.fromfile(job["labels"]["file"], numpy.uint8)
+    image = vtkImageData()
+    image.SetDimensions(side, side, side)
+    image.GetPointData().SetScalars(numpy_to_vtk(labels))
+
+    def nets():
+        surfaces = vtkSurfaceNets3D()
+        surfaces.SetInputData(image)
+        surfaces.GenerateLabels(int(labels.max()), 1, int(labels.max()))
+        surfaces.Update()
+        return surfaces.GetOutput()
+
+    milliseconds, found = best(job["repeats"], nets)
+    counts = {"triangles": found.GetNumberOfPolys()}
+    yield {"task": "labels", "what": "surface nets", "milliseconds": milliseconds, **counts}
+
+    positions, indices = read_mesh(job["mesh"])
+    mesh = vtkPolyData()
+    points, faces = vtkPoints(), vtkCellArray()
+    points.SetData(numpy_to_vtk(positions))
+    faces.SetData(3, numpy_to_vtkIdTypeArray(indices.ravel().astype(numpy.int64)))
+    mesh.SetPoints(points)
+    mesh.SetPolys(faces)
+
+    def decimate():
+        fewer = vtkQuadricDecimation()
+        fewer.SetInputData(mesh)
+        fewer.SetTargetReduction(1 - job["kept"])
+        fewer.VolumePreservationOn()
+        fewer.Update()
+        return fewer.GetOutput()
+
+    milliseconds, found = best(job["repeats"], decimate)
+    kept = vtk_to_numpy(found.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+    places = vtk_to_numpy(found.GetPoints().GetData())
+    yield tool("vtk", "decimate", "quadric decimation", job, milliseconds, places, kept)
+
+
+def read_mesh(mesh):
+    import numpy
+
+    positions = numpy.fromfile(mesh["positions"], numpy.float32).reshape(-1, 3)
+    return positions, numpy.fromfile(mesh["indices"], numpy.uint32).reshape(-1, 3)
 
 
 def scikit_image(job):
@@ -166,6 +223,9 @@ def scipy(job):
 def pymeshlab(job):
     import pymeshlab as meshlab
 
+    if "labels" in job:
+        yield from meshlab_tools(job)
+        return
     for mesh in job["meshes"]:
         # A new set for each run, because the filter changes its mesh.
         sets = [meshlab.MeshSet() for _ in range(job["repeats"])]
@@ -182,6 +242,41 @@ def pymeshlab(job):
         milliseconds, found = best(job["repeats"], remesh)
         surface = found.current_mesh()
         yield remeshed("pymeshlab", mesh, milliseconds, surface.vertex_matrix(), surface.face_matrix())
+
+
+def meshlab_tools(job):
+    import pymeshlab as meshlab
+
+    positions, indices = read_mesh(job["mesh"])
+    target = round(job["kept"] * len(indices))
+    tasks = {
+        "smooth": ("Taubin", lambda one: one.apply_coord_taubin_smoothing(stepsmoothnum=job["iterations"])),
+        "decimate": (
+            "quadric edge collapse",
+            lambda one: one.meshing_decimation_quadric_edge_collapse(targetfacenum=target, preservetopology=True),
+        ),
+    }
+    for task, (what, work) in tasks.items():
+        # A new set for each run, because the filters change their mesh.
+        sets = [meshlab.MeshSet() for _ in range(job["repeats"])]
+        for one in sets:
+            one.add_mesh(meshlab.Mesh(positions, indices))
+        run = iter(sets)
+
+        def filtered():
+            one = next(run)
+            work(one)
+            return one
+
+        milliseconds, found = best(job["repeats"], filtered)
+        surface = found.current_mesh()
+        yield tool("pymeshlab", task, what, job, milliseconds, surface.vertex_matrix(), surface.face_matrix())
+
+
+def tool(package, task, what, job, milliseconds, positions, triangles):
+    """Returns the result of a tool, and writes its mesh to files for the measurements of its quality."""
+    files = written(f"{job['mesh']['positions']}.{package}-{task}", positions, triangles)
+    return {"task": task, "what": what, "milliseconds": milliseconds, "triangles": len(triangles), "files": files}
 
 
 def cgal(job):
@@ -216,15 +311,20 @@ def arrays_of(polyhedron):
 
 def remeshed(package, mesh, milliseconds, positions, triangles):
     """Returns the result of remeshing, and writes its mesh to files for the measurements of its quality."""
-    import numpy
-
-    name = f"{mesh['file']}.{package}-{mesh['factor']}"
-    files = {"positions": f"{name}.f32", "indices": f"{name}.u32"}
-    numpy.asarray(positions, numpy.float32).tofile(files["positions"])
-    numpy.asarray(triangles, numpy.uint32).tofile(files["indices"])
+    files = written(f"{mesh['file']}.{package}-{mesh['factor']}", positions, triangles)
     counts = {"vertices": len(positions), "triangles": len(triangles)}
     what = f"{REMESHING_ROUNDS} rounds"
     return {"task": mesh["task"], "what": what, "milliseconds": milliseconds, **counts, "files": files}
+
+
+def written(name, positions, triangles):
+    """Writes a mesh, and returns its files."""
+    import numpy
+
+    files = {"positions": f"{name}.f32", "indices": f"{name}.u32"}
+    numpy.asarray(positions, numpy.float32).tofile(files["positions"])
+    numpy.asarray(triangles, numpy.uint32).tofile(files["indices"])
+    return files
 
 
 PEERS = {
@@ -266,7 +366,8 @@ def main(job, package=None):
     if package:
         results = measure(package, json.loads(Path(job).read_text()))
     else:
-        results = [result for name in PEERS for result in in_its_own_process(name, job)]
+        names = json.loads(Path(job).read_text()).get("packages", PEERS)
+        results = [result for name in names for result in in_its_own_process(name, job)]
     print(json.dumps(results))
 
 

@@ -106,6 +106,46 @@ async function writeMeshes(folder) {
   return written;
 }
 
+/** Compares the surfaces of a label map and tools for meshes with those of other packages. */
+export async function compareTools(repeats) {
+  const { labelMap, measure, roughMesh, ITERATIONS, KEPT } = await import('../bench/tools.mjs');
+  const host = `Node ${process.versions.node}`;
+  const { tasks, triangles } = await measure(repeats);
+  const size = `${triangles.toLocaleString('en')} triangles`;
+  const named = [
+    { task: 'labels', name: 'Surfaces of a label map, 192³ voxels, 30 labels that touch', packages: ['vtk'] },
+    { task: 'smooth', name: `Smoothing, ${ITERATIONS} iterations, ${size}`, packages: ['pymeshlab'] },
+    { task: 'decimate', name: `Decimation to a tenth, ${size}`, packages: ['pymeshlab', 'vtk'] },
+    { task: 'decimate within', name: `Decimation within .2 voxels, ${size}`, packages: [] },
+    { task: 'distance', name: `Signed distances, 256³ voxels, ${size}`, packages: [] },
+  ];
+  return inFolder(async (folder) => {
+    const [mesh, map] = [roughMesh(), labelMap()];
+    const paths = ['positions', 'indices', 'labels'].map((name) => join(folder, `${name}.bin`));
+    const { positions, indices } = mesh.arrays();
+    await Promise.all([positions, indices, map.data].map((array, k) => writeFile(paths[k], array)));
+    mesh.free();
+    const job = {
+      ...{ packages: ['vtk', 'pymeshlab'], repeats, iterations: ITERATIONS, kept: KEPT },
+      mesh: { positions: paths[0], indices: paths[1] },
+      labels: { file: paths[2], side: map.dims[0] },
+    };
+    const file = join(folder, 'job.json');
+    await writeFile(file, JSON.stringify(job));
+    const found = await measureTheirs(file);
+    const rows = named.flatMap((one) => {
+      const task = { host, ...PER_RUN, ...one, ours: tasks[one.task] };
+      return task.packages.length > 0 ? task.packages.map((name) => compare(task, name, found)) : [alone(task)];
+    });
+    return { bestOf: repeats, load, cores: cpus().length, rows: await Promise.all(rows) };
+  });
+}
+
+const alone = ({ task, name, unit, figure, host, ours }) => ({
+  ...{ task, name, unit },
+  ours: { host, figure: figure(ours), ...counts(ours) },
+});
+
 /** Formats an array as lines of three numbers each, after the prefix `first`. */
 function lines(array, first = '') {
   const line = (_, k) => `${first}${array[3 * k]} ${array[3 * k + 1]} ${array[3 * k + 2]}`;
@@ -170,7 +210,7 @@ export function peerRows({ rows, bestOf }) {
   for (const row of rows) {
     if (row.task !== task) lines.push(...heading(row));
     task = row.task;
-    lines.push(row.skipped ? skippedLine(row) : peerLine(row));
+    if (row.package) lines.push(row.skipped ? skippedLine(row) : peerLine(row));
   }
   return lines;
 }

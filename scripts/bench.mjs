@@ -5,7 +5,7 @@ import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
 import { buildApp } from './app.mjs';
 import { remeshNatively, stepsNatively } from './bench-native.mjs';
-import { comparePeers, peerRows } from './bench-peers.mjs';
+import { comparePeers, compareTools, peerRows } from './bench-peers.mjs';
 import { build } from './build.mjs';
 import { launchChromium } from './chromium.mjs';
 import { serve } from './serve.mjs';
@@ -74,6 +74,12 @@ const BENCHES = {
       return (await import('../bench/hosts.mjs')).measure(at('dist'));
     },
     rows: hostRows,
+  },
+  tools: {
+    // For docs/performance.md; not part of the report.
+    apart: true,
+    alone: () => compareTools(REPEATS),
+    rows: peerRows,
   },
   peers: {
     alone: () => comparePeers(SCAN, REPEATS),

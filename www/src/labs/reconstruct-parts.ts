@@ -152,7 +152,8 @@ export class ReconstructParts extends RunParts<CloudExample> {
   /** Shows what the model chose from the points for automatic parameters; undefined while it is not known. */
   showChoice(choice: ImplicitChoice | undefined): void {
     this.#choice = choice;
-    this.displayChosen({ ...choice });
+    const { sides: _, ...numbers } = { ...choice };
+    this.displayChosen(numbers);
     this.#showKernel();
   }
 

@@ -4,6 +4,7 @@ import type { ControlEllipsoid, Vec3 } from '../sculpt/protocol';
 import { text } from '../texts';
 import type { HandleMode } from '../view/handles';
 import { h, uniqueId } from './dom';
+import { showIn } from './field';
 
 const MODES: { mode: HandleMode; label: string; key: string; help: string }[] = [
   {
@@ -166,8 +167,8 @@ export class EllipsoidControls {
     this.#center[0]?.parentElement?.classList.toggle('long', isLong);
     for (let k = 0; k < 3; k++) {
       const [center, length] = [this.#center[k], this.#lengths[k]];
-      if (center && center !== document.activeElement) center.value = place[k] ?? '';
-      if (length && length !== document.activeElement) length.value = short(lengths[k] ?? 0);
+      if (center) showIn(center, place[k] ?? '');
+      if (length) showIn(length, short(lengths[k] ?? 0));
     }
   }
 
@@ -268,15 +269,7 @@ export class EllipsoidControls {
 
   #reject(message: string): void {
     const ellipsoid = this.#ellipsoid;
-    if (ellipsoid) {
-      const [lengths, place] = [lengthsOf(ellipsoid), this.#place(ellipsoid)];
-      this.#center.forEach((field, k) => {
-        field.value = place[k] ?? '';
-      });
-      this.#lengths.forEach((field, k) => {
-        field.value = short(lengths[k] ?? 0);
-      });
-    }
+    if (ellipsoid) this.#showNumbers(ellipsoid);
     this.showError(message);
   }
 }
