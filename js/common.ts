@@ -28,6 +28,7 @@ export {
   type MeshFormat,
   type MeshHit,
   type MeshInfo,
+  type MeshInSlices,
   type MeshReport,
   type PositionOptions,
   type RestructurePass,
@@ -36,7 +37,7 @@ export {
 } from './mesh.js';
 export type { ParamSpec } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';
-export type { RunOptions, Stepper, StepReport } from './stepper.js';
+export type { RunOptions, SliceOptions, Stepper, StepReport } from './stepper.js';
 export { Volume, type VolumeFormat } from './volume.js';
 export type { Warning, WarningCode } from './warning.js';
 

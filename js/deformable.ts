@@ -326,11 +326,12 @@ export class DeformableModel implements Stepper {
   }
 
   /**
-   * Runs to the end, yielding to the event loop between slices of work. Parameters and attractors may be changed
-   * meanwhile.
+   * Runs to the end, yielding to the event loop between slices of work, also within a step. Whatever is asked of the model
+   * or its mesh meanwhile ends a step that is under way first. Parameters and attractors may be changed meanwhile. With a
+   * {@link LargeVolume}, steps are not interrupted.
    *
    * @returns The last report.
-   * @throws `signal.reason` when aborted, and the model stays usable; any error thrown by `onStep` or `onData`;
+   * @throws `signal.reason` when aborted, and the model is as after the last step that ended, and stays usable; any error thrown by `onStep` or `onData`;
    *   {@link VesicleError} `invalid-argument` while another run is in progress, `freed` when the model is freed
    *   meanwhile; those of reading a {@link LargeVolume}, such as `unavailable`: the model stays usable, and another run
    *   continues.
@@ -338,11 +339,26 @@ export class DeformableModel implements Stepper {
   async run(given?: DeformableRunOptions): Promise<StepReport> {
     const { onData, ...run } = checkProperties<DeformableRunOptions>('options', given, RUN_OPTIONS);
     checkListener('onData', onData);
-    return this.#runner.run(() => this.#step(1), run, onData);
+    try {
+      return await this.#runner.run(() => this.#advance(), run, onData);
+    } catch (error) {
+      // Of a step that is under way, nothing stays.
+      if (run.signal?.aborted && !this.#handle.isFreed) this.#handle.use((raw) => raw.discard());
+      throw error;
+    }
+  }
+
+  /** Does a slice of a step; returns its report at its end. */
+  #advance(): StepReport | undefined {
+    const report = this.#handle.use((raw) => raw.advance() as Stepped | undefined);
+    return report && this.#taken(report);
   }
 
   #step(iterations: number): StepReport {
-    const report = this.#handle.use((raw) => raw.step(iterations) as StepReport | { needs: SparseBox[] });
+    return this.#taken(this.#handle.use((raw) => raw.step(iterations) as Stepped));
+  }
+
+  #taken(report: Stepped): StepReport {
     if (!('needs' in report)) return this.#warnings.take(report);
     throw new NeedsDataError((options) => this.#load(report.needs, options));
   }
@@ -477,6 +493,9 @@ interface SparseParts {
   source: SparseSource;
   volume: ReturnType<SparseSource['create']>;
 }
+
+/** The report of a step, or the parts of a large volume that it needs. */
+type Stepped = StepReport | { needs: SparseBox[] };
 
 type Options = Partial<DeformableOptions>;
 

@@ -35,10 +35,11 @@ import {
   stated,
 } from './mesh-file.js';
 import { call, Handle } from './runtime.js';
+import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
 // Entry points without readers of files lack `RawMeshFile`, which an import by name would demand.
 import * as glue from './vesicle.js';
-import { type RawArrays, RawExtra, RawMesh } from './vesicle.js';
+import { type RawArrays, RawExtra, RawMesh, type RawMeshWork } from './vesicle.js';
 import { type Volume, volumeHandle, withWarnings, wrapVolume } from './volume.js';
 import type { Warning } from './warning.js';
 import { checkedWarnings, mergedWarnings, notesOf, recentred } from './warnings.js';
@@ -185,6 +186,23 @@ export type VoxelKind =
   /** Signed distance of the voxel centre from the surface, world units, negative inside. */
   | 'distance';
 
+/**
+ * Long operations of a mesh in slices of work, as returned by {@link Mesh.inSlices}: each is the method of {@link Mesh} of
+ * the same name, but for the promise.
+ */
+export interface MeshInSlices {
+  /** As {@link Mesh.remesh}. */
+  remesh(edge: { min: number; max: number }): Promise<void>;
+  /** As {@link Mesh.restructure}. */
+  restructure(edge: { min: number; max: number }, passes?: readonly RestructurePass[]): Promise<number>;
+  /** As {@link Mesh.decimate}. */
+  decimate(targetTriangles: number): Promise<void>;
+  /** As {@link Mesh.decimateWithin}. */
+  decimateWithin(maxDistance: number, options?: { targetTriangles?: number }): Promise<void>;
+  /** As {@link Mesh.distanceTo}, for the two surfaces as they are when it is called. */
+  distanceTo(other: Mesh): Promise<SurfaceDistance>;
+}
+
 const VOXEL_KINDS: readonly VoxelKind[] = ['mask', 'coverage', 'distance'];
 
 /** A pass of {@link Mesh.restructure}, named by what it does to edges. */
@@ -226,6 +244,8 @@ export class Mesh {
   readonly #live: boolean;
   readonly #warnings: () => readonly Warning[];
   #frame: MeshFrame;
+  /** Whether an operation in slices is changing the mesh. */
+  #isChanging = false;
 
   static {
     wrapMesh = (...parts) => new Mesh(...parts);
@@ -473,7 +493,7 @@ export class Mesh {
    *   `too-large` for more than four million vertices.
    */
   refine(): void {
-    this.#handle.use((raw) => raw.refine());
+    this.#edit('refine', (raw) => raw.refine());
   }
 
   /**
@@ -489,10 +509,8 @@ export class Mesh {
    */
   restructure(edge: { min: number; max: number }, passes: readonly RestructurePass[] = RESTRUCTURE_PASSES): number {
     const [min, max] = edgeBounds(edge);
-    const codes = denseCopy('passes', passes).map((pass) =>
-      RESTRUCTURE_PASSES.indexOf(choice('passes', pass, RESTRUCTURE_PASSES)),
-    );
-    return this.#handle.use((raw) => raw.restructure(min, max, Uint8Array.from(codes)));
+    const codes = passCodes(passes);
+    return this.#edit('restructure', (raw) => raw.restructure(min, max, codes));
   }
 
   /**
@@ -509,7 +527,7 @@ export class Mesh {
    */
   decimate(targetTriangles: number): void {
     number('targetTriangles', targetTriangles, { min: 1 });
-    this.#handle.use((raw) => raw.decimate(targetTriangles));
+    this.#edit('decimate', (raw) => raw.decimate(targetTriangles));
   }
 
   /**
@@ -524,10 +542,8 @@ export class Mesh {
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first.
    */
   decimateWithin(maxDistance: number, options: { targetTriangles?: number } = {}): void {
-    const distance = number('maxDistance', maxDistance, { min: 0 });
-    const copy = checkProperties('options', shallowCopy('options', options), ['targetTriangles']);
-    const target = number('targetTriangles', copy.targetTriangles ?? 1, { min: 1 });
-    this.#handle.use((raw) => raw.decimateWithin(target, distance));
+    const [target, distance] = decimationBounds(maxDistance, options);
+    this.#edit('decimateWithin', (raw) => raw.decimateWithin(target, distance));
   }
 
   /**
@@ -547,7 +563,7 @@ export class Mesh {
    */
   remesh(edge: { min: number; max: number }): void {
     const [min, max] = edgeBounds(edge);
-    this.#handle.use((raw) => raw.remesh(min, max));
+    this.#edit('remesh', (raw) => raw.remesh(min, max));
   }
 
   /**
@@ -571,7 +587,7 @@ export class Mesh {
     const { iterations, keepVolume = true } = copy;
     const count = integer('iterations', iterations, { max: 10_000 });
     if (typeof keepVolume !== 'boolean') throw invalid('keepVolume', 'must be true or false');
-    this.#handle.use((raw) => raw.smooth(count, keepVolume));
+    this.#edit('smooth', (raw) => raw.smooth(count, keepVolume));
   }
 
   /**
@@ -588,7 +604,7 @@ export class Mesh {
    */
   transform(matrix: ArrayLike<number>): void {
     const entries = numbers('matrix', matrix, 16);
-    this.#handle.use((raw) => raw.transform(entries));
+    this.#edit('transform', (raw) => raw.transform(entries));
     this.#frame = {};
   }
 
@@ -611,7 +627,7 @@ export class Mesh {
     const { origin, normal } = checkProperties('plane', shallowCopy('plane', plane), ['origin', 'normal']);
     const point = vec3('plane.origin', origin);
     const across = nonZero('plane.normal', vec3('plane.normal', normal));
-    this.#handle.use((raw) => raw.cut(point, across));
+    this.#edit('cut', (raw) => raw.cut(point, across));
   }
 
   /**
@@ -626,7 +642,7 @@ export class Mesh {
   keepComponents(indices: readonly number[]): void {
     const kept = denseCopy('indices', indices).map((index) => integer('indices', index));
     if (kept.length === 0) throw invalid('indices', 'must name at least one component');
-    this.#handle.use((raw) => raw.keepComponents(Uint32Array.from(kept)));
+    this.#edit('keepComponents', (raw) => raw.keepComponents(Uint32Array.from(kept)));
   }
 
   /**
@@ -638,7 +654,7 @@ export class Mesh {
    * @throws {@link VesicleError} `not-closed`; `invalid-argument` for the mesh of a model: `clone()` it first.
    */
   removeCavities(): void {
-    this.#handle.use((raw) => raw.removeCavities());
+    this.#edit('removeCavities', (raw) => raw.removeCavities());
   }
 
   /**
@@ -804,6 +820,86 @@ export class Mesh {
     return this.#handle.use((raw) => raw.toBytes(format, recentre, notes, ...frame));
   }
 
+  /**
+   * Returns long operations of this mesh that yield to the event loop between slices of work and can be aborted:
+   * `await mesh.inSlices({ signal }).remesh({ min: 1, max: 2 })`. Arguments, results and errors are those of the
+   * methods of the same name, bit for bit.
+   *
+   * An operation works on a copy. The mesh is unchanged until the end, and if the operation fails or is aborted; it can
+   * be read and copied meanwhile, and freed, whereupon the operation rejects with `freed`. Calls that would change it
+   * are refused until then.
+   *
+   * Entry points with one method lack it.
+   *
+   * @param options - `signal`: aborts operations, which reject with `signal.reason`; `budgetMs`: duration of a slice of
+   *   work, milliseconds, default 12.
+   * @throws {@link VesicleError} `invalid-argument`. What changes the mesh throws it, too, naming its method, while an
+   *   operation in slices changes this mesh.
+   */
+  inSlices(options?: SliceOptions): MeshInSlices {
+    const slices = checkedSlices(options);
+    const change = <T>(what: string, begin: (raw: RawMesh) => RawMeshWork) => this.#change<T>(what, begin, slices);
+    return {
+      remesh: async (edge) => {
+        const [min, max] = edgeBounds(edge);
+        return change('remesh', (raw) => raw.remeshInSlices(min, max));
+      },
+      restructure: async (edge, passes = RESTRUCTURE_PASSES) => {
+        const [min, max] = edgeBounds(edge);
+        const codes = passCodes(passes);
+        return change('restructure', (raw) => raw.restructureInSlices(min, max, codes));
+      },
+      decimate: async (targetTriangles) => {
+        number('targetTriangles', targetTriangles, { min: 1 });
+        return change('decimate', (raw) => raw.decimateInSlices(targetTriangles));
+      },
+      decimateWithin: async (maxDistance, within = {}) => {
+        const [target, distance] = decimationBounds(maxDistance, within);
+        return change('decimateWithin', (raw) => raw.decimateWithinInSlices(target, distance));
+      },
+      distanceTo: async (other) => {
+        const handle = meshHandle('other', other);
+        return this.#work((raw) => handle.use((rawOther) => raw.distanceToInSlices(rawOther)), slices);
+      },
+    };
+  }
+
+  /** Changes the mesh by the operation that `begin` begins; other changes are refused until then. */
+  async #change<T>(what: string, begin: (raw: RawMesh) => RawMeshWork, slices: SliceOptions): Promise<T> {
+    slices.signal?.throwIfAborted();
+    this.#refuseWhileChanging(what);
+    this.#isChanging = true;
+    try {
+      return await this.#work<T>(begin, slices);
+    } finally {
+      this.#isChanging = false;
+    }
+  }
+
+  /** Does the work that `begin` begins in slices; returns its value. */
+  async #work<T>(begin: (raw: RawMesh) => RawMeshWork, { signal, budgetMs }: SliceOptions): Promise<T> {
+    signal?.throwIfAborted();
+    const work = new Handle('Mesh', () => this.#handle.use(begin));
+    try {
+      const advance = () => this.#handle.use((raw) => work.use((one) => one.advance(raw)));
+      const [value] = await runInSlices(advance, signal, budgetMs);
+      return value as T;
+    } finally {
+      work.free();
+    }
+  }
+
+  #refuseWhileChanging(what: string): void {
+    if (!this.#isChanging) return;
+    throw invalid(what, 'not allowed while this mesh is changed in slices: abort that, or wait for its end');
+  }
+
+  /** Calls `work`, which changes the mesh. */
+  #edit<T>(what: string, work: (raw: RawMesh) => T): T {
+    this.#refuseWhileChanging(what);
+    return this.#handle.use(work);
+  }
+
   /** Returns an independent copy; for a model's live mesh, of its present state. */
   clone(): Mesh {
     return this.#handle.use((raw) => made(() => raw.clone(), this.#facts()));
@@ -834,6 +930,18 @@ function isRelative(options: PositionOptions | undefined): boolean {
 
 function triple(numbers: Float64Array): Vec3 {
   return Array.from(numbers) as Vec3;
+}
+
+function passCodes(passes: readonly RestructurePass[]): Uint8Array {
+  const code = (pass: RestructurePass) => RESTRUCTURE_PASSES.indexOf(choice('passes', pass, RESTRUCTURE_PASSES));
+  return Uint8Array.from(denseCopy('passes', passes).map(code));
+}
+
+/** Returns the target and the largest distance of {@link Mesh.decimateWithin} once they are checked. */
+function decimationBounds(maxDistance: number, options: { targetTriangles?: number }): [number, number] {
+  const distance = number('maxDistance', maxDistance, { min: 0 });
+  const copy = checkProperties('options', shallowCopy('options', options), ['targetTriangles']);
+  return [number('targetTriangles', copy.targetTriangles ?? 1, { min: 1 }), distance];
 }
 
 function edgeBounds(edge: { min: number; max: number }): [number, number] {

@@ -3,8 +3,16 @@ import type { Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { frameOf, type MeshFrame } from './mesh-file.js';
 import { Handle } from './runtime.js';
-import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
-import { RawMultires, TriangleCopy } from './vesicle.js';
+import {
+  checkedSlices,
+  Runner,
+  type RunOptions,
+  runInSlices,
+  type SliceOptions,
+  type Stepper,
+  type StepReport,
+} from './stepper.js';
+import { RawMultires, RawMultiresCreation, TriangleCopy } from './vesicle.js';
 import { ModelWarnings } from './warnings.js';
 
 /**
@@ -99,6 +107,8 @@ interface Counts {
 }
 
 const OPTIONS = ['detail', 'base', 'ellipsoids', 'support', 'params'];
+const NAME = 'MultiresolutionModel';
+
 const SUPPORTS = ['membrane', 'surface'] as const;
 
 /**
@@ -131,20 +141,32 @@ export class MultiresolutionModel implements Stepper {
    *   vertices.
    */
   constructor(given: MultiresOptions) {
-    const known = checkProperties('options', given, OPTIONS) as MultiresOptions;
-    const usual = known.detail && !known.base ? 'surface' : 'membrane';
-    const holdsItself = choice('support', known.support ?? usual, SUPPORTS) === 'surface';
-    const ellipsoids = known.ellipsoids ?? (holdsItself ? [] : known.ellipsoids);
-    const packed = packedEllipsoids(ellipsoids as readonly ControlEllipsoid[]);
-    const params = shallowCopy('params', known.params ?? {});
-    this.#handle = new Handle('MultiresolutionModel', () => {
-      const [detail, base] = [triangles('detail', known.detail), triangles('base', known.base)];
-      return new RawMultires(detail, base, packed, params, holdsItself);
-    });
+    const created = given instanceof Created ? given : begun(given, (...of) => new RawMultires(...of));
+    this.#handle = created.handle;
     this.#meshHandles = [0, 1, 2].map((which) => new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh(which))));
-    this.#warnings = new ModelWarnings(known.detail?.warnings, known.base?.warnings);
-    this.#frame = frameOf(known.detail ?? known.base);
+    this.#warnings = created.warnings;
+    this.#frame = created.frame;
     this.#meshes = this.#meshHandles.map((handle) => wrapMesh(handle, true, () => this.#warnings.of(), this.#frame));
+  }
+
+  /**
+   * Creates a model as the constructor does, bit for bit, yielding to the event loop between slices of work: that of a
+   * large detail takes seconds. The meshes may be freed meanwhile.
+   *
+   * @param options - `signal`: aborts the creation; `budgetMs`: duration of a slice, milliseconds, default 12.
+   * @throws As the constructor; `signal.reason` when aborted.
+   */
+  static async create(given: MultiresOptions, options?: SliceOptions): Promise<MultiresolutionModel> {
+    const { signal, budgetMs } = checkedSlices(options);
+    signal?.throwIfAborted();
+    const creation = begun(given, (...of) => new RawMultiresCreation(...of));
+    try {
+      const raw = await runInSlices(() => creation.handle.use((one) => one.advance()), signal, budgetMs);
+      const created = new Created(new Handle(NAME, () => raw), creation.warnings, creation.frame);
+      return new MultiresolutionModel(created as unknown as MultiresOptions);
+    } finally {
+      creation.handle.free();
+    }
   }
 
   /**
@@ -322,6 +344,34 @@ export class MultiresolutionModel implements Stepper {
   [Symbol.dispose](): void {
     this.free();
   }
+}
+
+/** A model, or its creation, that {@link MultiresolutionModel.create} passes to the constructor. */
+class Created<Raw extends { free(): void }> {
+  constructor(
+    readonly handle: Handle<Raw>,
+    readonly warnings: ModelWarnings,
+    readonly frame: MeshFrame,
+  ) {}
+}
+
+/** Makes what needs the arguments of a model by `make`. */
+function begun<Raw extends { free(): void }>(
+  given: MultiresOptions,
+  make: (...of: ConstructorParameters<typeof RawMultires>) => Raw,
+): Created<Raw> {
+  const known = checkProperties('options', given, OPTIONS) as MultiresOptions;
+  const usual = known.detail && !known.base ? 'surface' : 'membrane';
+  const holdsItself = choice('support', known.support ?? usual, SUPPORTS) === 'surface';
+  const ellipsoids = known.ellipsoids ?? (holdsItself ? [] : known.ellipsoids);
+  const packed = packedEllipsoids(ellipsoids as readonly ControlEllipsoid[]);
+  const params = shallowCopy('params', known.params ?? {});
+  const handle = new Handle(NAME, () => {
+    const [detail, base] = [triangles('detail', known.detail), triangles('base', known.base)];
+    return make(detail, base, packed, params, holdsItself);
+  });
+  const warnings = new ModelWarnings(known.detail?.warnings, known.base?.warnings);
+  return new Created(handle, warnings, frameOf(known.detail ?? known.base));
 }
 
 function triangles(parameter: string, mesh: Mesh | undefined): TriangleCopy | undefined {

@@ -57,8 +57,8 @@ export interface RunOptions {
    */
   maxIterations?: number;
   /**
-   * Duration of a slice of work before yielding to the event loop, milliseconds; default 12. Steps are never
-   * interrupted but for those of `LabelSurfaces` and `SurfaceTracker`.
+   * Duration of a slice of work before yielding to the event loop, milliseconds; default 12. Steps of `ImplicitSurface`
+   * and `MultiresolutionModel`, and those with a `LargeVolume`, are not interrupted.
    */
   budgetMs?: number;
   /** Called with the report of every iteration. If it throws, the run ends and rejects with that error. */

@@ -31,6 +31,7 @@ import {
   type Reply,
   type Report,
   type Request,
+  SLICED,
   STATICS,
   type Task,
 } from './worker-protocol.js';
@@ -85,6 +86,7 @@ class Host {
   #perform(id: number, task: Task): unknown {
     if (task.type === 'init') return start(task.module);
     if (task.type === 'make') return this.#make(task.as, task.args);
+    if (task.slices) return this.#sliced(id, task, task.slices);
     if (Object.hasOwn(ABORTABLE, task.name)) return this.#abortable(id, task);
     return task.name === 'copyTo' ? this.#copyTo(task) : this.#call(task);
   }
@@ -139,17 +141,33 @@ class Host {
     return { counts: (target as unknown as Mesh).copyTo(arrays, options), arrays };
   }
 
-  async #abortable(id: number, { on, name, args, reports }: Call): Promise<unknown> {
+  #abortable(id: number, { on, name, args, reports }: Call): Promise<unknown> {
     const { target } = this.#find(on, name);
     const given = this.#incoming(args);
     const options = given.pop() as object;
-    const abort = new AbortController();
-    this.#controllers.set(id, abort);
     const listener = (report: Report) => this.#post({ type: 'report', id, report }, []);
     const listeners = reports && { [ABORTABLE[name as keyof typeof ABORTABLE]]: listener };
+    const work = target[name] as (...args: unknown[]) => Promise<unknown>;
+    return this.#withSignal(id, (signal) => work.call(target, ...given, { ...options, signal, ...listeners }));
+  }
+
+  /** Calls an operation of `Mesh.inSlices`. */
+  #sliced(id: number, { on, name, args }: Call, options: object): Promise<unknown> {
+    const { target } = this.#find(on, 'inSlices');
+    lookUp(SLICED, name);
+    const given = this.#incoming(args);
+    return this.#withSignal(id, (signal) => {
+      const operations = record((target as unknown as Mesh).inSlices({ ...options, signal }));
+      return (operations[name] as (...args: unknown[]) => Promise<unknown>)(...given);
+    });
+  }
+
+  /** Calls `work` with a signal that the page aborts by the id of its request. */
+  async #withSignal(id: number, work: (signal: AbortSignal) => Promise<unknown>): Promise<unknown> {
+    const abort = new AbortController();
+    this.#controllers.set(id, abort);
     try {
-      const work = target[name] as (...args: unknown[]) => Promise<unknown>;
-      return await work.call(target, ...given, { ...options, signal: abort.signal, ...listeners });
+      return await work(abort.signal);
     } finally {
       this.#controllers.delete(id);
     }

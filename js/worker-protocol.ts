@@ -1,7 +1,7 @@
 // Messages between the page and the worker, and tables of the members that may be accessed. Nothing outside these
 // tables is ever called.
 import { VesicleError } from './error.js';
-import type { ErrorCode } from './index.js';
+import type { ErrorCode, MeshInSlices } from './index.js';
 import type { StepReport } from './stepper.js';
 import type { ClassName, FunctionName, Library } from './worker-types.js';
 
@@ -20,9 +20,16 @@ export type Task =
   | { type: 'make'; as: Reference; args: unknown[] }
   /**
    * Call of the method or property `name` of an object or class, or of a free function if `on` is undefined; `reports`
-   * requests reports of its progress.
+   * requests reports of its progress. With `slices`, the options, `name` is one of the operations of `Mesh.inSlices`.
    */
-  | { type: 'call'; on: Reference | ClassName | undefined; name: string; args: unknown[]; reports?: boolean };
+  | {
+      type: 'call';
+      on: Reference | ClassName | undefined;
+      name: string;
+      args: unknown[];
+      reports?: boolean;
+      slices?: { budgetMs?: number };
+    };
 
 /** A message from the page to the worker. */
 export type Request = (Task & { id: number }) | { type: 'abort'; id: number } | { type: 'free'; object: number };
@@ -136,6 +143,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     crossSection: 'method',
     toBytes: 'method',
     clone: 'method',
+    inSlices: 'method',
   },
   DeformableModel: {
     ...STEPPER,
@@ -201,6 +209,15 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
   },
 };
 
+/** Operations of `Mesh.inSlices` that the page may call in the worker. */
+export const SLICED: Names<keyof MeshInSlices> = {
+  remesh: 'method',
+  restructure: 'method',
+  decimate: 'method',
+  decimateWithin: 'method',
+  distanceTo: 'method',
+};
+
 /** Static methods that the page may call in the worker, by class. */
 export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N], 'prototype'>> } = {
   Volume: { parse: 'method', fromFrames: 'method' },
@@ -208,7 +225,7 @@ export const STATICS: { readonly [N in ClassName]: Names<Exclude<keyof Library[N
   DeformableModel: { maxLevels: 'method', create: 'method' },
   ImplicitSurface: {},
   SurfaceTracker: { propose: 'method', create: 'method' },
-  MultiresolutionModel: {},
+  MultiresolutionModel: { create: 'method' },
   LabelSurfaces: { create: 'method' },
 };
 

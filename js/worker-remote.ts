@@ -12,6 +12,7 @@ import {
   mapObjects,
   type Reference,
   type Report,
+  SLICED,
   STATICS,
   type Task,
 } from './worker-protocol.js';
@@ -191,12 +192,12 @@ async function post(
 
 async function run(remote: Remote, given?: RunOptions): Promise<unknown> {
   const { signal, onStep, ...rest } = checkedRun(given);
-  return abortable(remote, 'run', [rest], signal, onStep as Listener | undefined);
+  return abortable(remote, 'run', [rest], signal, { listener: onStep as Listener | undefined });
 }
 
 async function coverage(remote: Remote, given?: CoverageOptions): Promise<unknown> {
   const { signal, onProgress, ...rest } = checkedCoverage(given);
-  return abortable(remote, 'coverage', [rest], signal, onProgress as Listener | undefined);
+  return abortable(remote, 'coverage', [rest], signal, { listener: onProgress as Listener | undefined });
 }
 
 type Listener = (report: Report) => void;
@@ -207,10 +208,10 @@ type Listener = (report: Report) => void;
  */
 async function abortable(
   on: Remote | ClassName,
-  name: keyof typeof ABORTABLE,
+  name: keyof typeof ABORTABLE | keyof typeof SLICED,
   args: readonly unknown[],
   signal: AbortSignal | undefined,
-  listener?: Listener,
+  { listener, slices }: { listener?: Listener | undefined; slices?: SliceOptions } = {},
 ): Promise<unknown> {
   signal?.throwIfAborted();
   const session = on instanceof Remote ? sessionOf(on) : currentSession();
@@ -218,7 +219,8 @@ async function abortable(
   const onReport = listener && ((report: Report) => notify(listener, report, stop));
   const target = on instanceof Remote ? referenceOf(on) : on;
   const sent = serialize(args);
-  const task: Task = { type: 'call', on: target, name, args: sent.args, reports: !!listener };
+  const call = { on: target, name, args: sent.args, reports: !!listener };
+  const task: Task = { type: 'call', ...call, ...(slices && { slices }) };
   const { id, answer } = session.post(task, { ...sent, target: on, onReport });
   const abort = () => stop.abort(signal?.reason);
   signal?.addEventListener('abort', abort);
@@ -303,12 +305,23 @@ function remoteClass(name: ClassName): Class {
   return proxy;
 }
 
+/** Implements `Mesh.inSlices`: the operations are at hand at once, and run in the worker. */
+function inSlices(remote: Remote, options?: SliceOptions): Record<string, unknown> {
+  const { signal, ...slices } = checkedSlices(options);
+  const operation = (name: string) => [
+    name,
+    async (...args: unknown[]) => abortable(remote, name as keyof typeof SLICED, args, signal, { slices }),
+  ];
+  return Object.fromEntries(Object.keys(SLICED).map(operation));
+}
+
 const SPECIAL: Record<string, (remote: Remote, ...args: never[]) => Promise<unknown>> = { run, coverage, copyTo };
 
 function memberOf(name: string, kind: string): PropertyDescriptor {
   const special = Object.hasOwn(SPECIAL, name) ? SPECIAL[name] : undefined;
   const call = async (remote: Remote, args: unknown[]) =>
     special ? special(remote, ...(args as never[])) : post(sessionOf(remote), remote, name, args);
+  if (name === 'inSlices') return { value: asMethod((remote, [options]) => inSlices(remote, options as SliceOptions)) };
   if (kind === 'live') return { get: asMethod((remote) => remote.part(name)) };
   if (kind === 'value') return { get: asMethod((remote) => call(remote, [])) };
   return { value: asMethod(call) };

@@ -77,11 +77,18 @@ type Arguments<A extends unknown[]> = { [K in keyof A]: WithRemotes<A[K]> };
 // Method types are compared bivariantly, so that each remote model is a Stepper, as in the library.
 type Method<A extends unknown[], R> = { method(...args: A): R }['method'];
 
+type Members<T> = { [K in keyof T]: Member<T[K]> };
+
+/** The operations of `Mesh.inSlices` of a proxy. */
+export type MeshInSlices = Members<vesicle.MeshInSlices>;
+
 type Member<T> = [T] extends [LibraryObject]
   ? WithRemotes<T>
-  : [T] extends [(...args: infer A) => infer R]
-    ? Method<Arguments<A>, Promise<WithRemotes<Awaited<R>>>>
-    : Promise<WithRemotes<T>>;
+  : [T] extends [(...args: infer A) => vesicle.MeshInSlices]
+    ? Method<A, MeshInSlices>
+    : [T] extends [(...args: infer A) => infer R]
+      ? Method<Arguments<A>, Promise<WithRemotes<Awaited<R>>>>
+      : Promise<WithRemotes<T>>;
 
 /**
  * Proxy of an object in the worker: methods and properties return promises; live meshes are available synchronously.

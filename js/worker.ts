@@ -17,7 +17,7 @@
  * **Promises.** Methods, functions and properties return promises: `await mesh.check()`, `await volume.dims`. Volumes,
  * meshes and models are returned as proxies of objects in the worker. The worker handles requests in order, so nothing
  * need be awaited for the sake of order alone: `model.setParams(params); model.step();`. During a run, other requests
- * are handled between its steps. Live meshes, as in `model.mesh.arrays()`, are available without a promise, and are the
+ * are handled between its slices of work. Live meshes, as in `model.mesh.arrays()`, are available without a promise, and are the
  * same object always.
  *
  * **New objects.** `new Volume(…)` returns an object that can be used at once. If it cannot be created, every promise
@@ -25,9 +25,10 @@
  * itself.
  *
  * **Runs.** `run({ signal, onStep })` calls `onStep` on the page, with reports of finished steps while the worker
- * continues. When the signal aborts, or `onStep` throws, the worker stops after its current step, so it may be some
+ * continues. When the signal aborts, or `onStep` throws, the worker stops after its current slice of work, so it may be some
  * steps ahead of the last report; the promise then rejects with `signal.reason`, or with the error thrown.
- * `coverage({ signal, onProgress })` works the same way.
+ * `coverage({ signal, onProgress })` works the same way, and so do the operations of `mesh.inSlices({ signal })`, which
+ * is available without a promise.
  *
  * **Arrays.** Typed arrays are copied, once; {@link transfer} transfers them instead. Those of results are transferred
  * by the worker. `mesh.copyTo(out)` transfers the buffers of `out` there and back: `out` has empty arrays until the
@@ -82,6 +83,7 @@ export type {
   PointEdits,
   RestructurePass,
   RunOptions,
+  SliceOptions,
   Space,
   StepReport,
   SurfaceDistance,
@@ -110,6 +112,9 @@ export type LabelOptions = there.WithRemotes<vesicle.LabelOptions>;
 export type MultiresOptions = there.WithRemotes<vesicle.MultiresOptions>;
 /** Constructor options of a {@link SurfaceTracker} in the worker, as in `vesicle`. */
 export type TrackingOptions = there.WithRemotes<vesicle.TrackingOptions>;
+
+/** Operations of a {@link Mesh} in the worker in slices of work, as in `vesicle`. */
+export type MeshInSlices = there.MeshInSlices;
 
 export type Volume = there.Volume;
 export type Mesh = there.Mesh;

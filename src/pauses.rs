@@ -12,13 +12,20 @@ const SLICE: u32 = 500;
 
 /// The pauses of a computation, which counts its work.
 #[derive(Clone, Default)]
-pub struct Pauses(Rc<Cell<u32>>);
+pub struct Pauses(Rc<Counts>);
+
+/// Units of work: of the current slice, and of those before.
+#[derive(Default)]
+struct Counts {
+    slice: Cell<u32>,
+    before: Cell<u64>,
+}
 
 impl Pauses {
     /// Counts work that was done, and pauses if a slice is complete.
     pub async fn after(&self, work: usize) {
-        let done = self.0.get().saturating_add(u32::try_from(work).unwrap_or(u32::MAX));
-        self.0.set(done);
+        let done = self.0.slice.get().saturating_add(u32::try_from(work).unwrap_or(u32::MAX));
+        self.0.slice.set(done);
         if done >= SLICE {
             self.now().await;
         }
@@ -26,8 +33,14 @@ impl Pauses {
 
     /// Pauses at once, between two parts of a computation.
     pub async fn now(&self) {
-        self.0.set(0);
+        self.0.before.set(self.work());
+        self.0.slice.set(0);
         pause().await;
+    }
+
+    /// Returns the units of work so far.
+    pub fn work(&self) -> u64 {
+        self.0.before.get() + u64::from(self.0.slice.get())
     }
 }
 
@@ -72,5 +85,9 @@ mod tests {
         let mut computation = Box::pin(sum(Pauses::default()));
         let pauses = (0..).take_while(|_| advance(&mut computation).is_pending()).count();
         assert_eq!(pauses, 5);
+        let pauses = Pauses::default();
+        finished(sum(pauses.clone()));
+        finished(pauses.after(3));
+        assert_eq!(pauses.work(), 5 * u64::from(SLICE) + 3);
     }
 }

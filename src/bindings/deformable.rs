@@ -1,8 +1,7 @@
 //! Bindings of the deformable model.
 
-use std::cell::RefCell;
+use std::cell::{RefCell, RefMut};
 use std::future::Future;
-use std::pin::Pin;
 use std::rc::Rc;
 use std::task::Poll;
 
@@ -13,13 +12,14 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::{doubles, to_js, with_overrides, world_points};
 use super::error::Failure;
 use super::mesh::RawMesh;
-use super::method::{method_bindings, shared};
+use super::method::{method_bindings, reported};
+use super::stepping::{Computation, LiveStepping, Sliced, Stepping};
 use super::volume::RawVolume;
 use vesicle::math::DVec3;
-use vesicle::methods::MethodError;
 use vesicle::methods::deformable::{
     Attractor, Coverage, CoverageSurvey, DeformableModel, DeformableOptions, DeformableParams, Missing, Start,
 };
+use vesicle::methods::{MethodError, StepReport};
 use vesicle::pauses::advance;
 
 /// The raw handle of a start surface, from which a deformable model begins.
@@ -65,7 +65,23 @@ impl RawStart {
 
 /// The raw handle of the TypeScript class `DeformableModel`, which shares the model with the live mesh of its surface.
 #[wasm_bindgen]
-pub struct RawDeformable(pub(super) Rc<RefCell<DeformableModel>>);
+pub struct RawDeformable(pub(super) Rc<Stepping<DeformableModel>>);
+
+impl Sliced for DeformableModel {
+    fn step_in_slices(&mut self) -> impl Future<Output = Result<StepReport, MethodError>> {
+        self.step_in_slices()
+    }
+
+    fn discard_step(&mut self) {
+        self.discard_step();
+    }
+}
+
+impl RawDeformable {
+    pub(super) fn ready(&self) -> RefMut<'_, DeformableModel> {
+        self.0.ready()
+    }
+}
 
 /// Returns the options of a model of a volume; properties of `params` replace the default parameters for that volume.
 fn options(
@@ -82,7 +98,7 @@ fn options(
 
 /// A model that is being created in slices.
 #[wasm_bindgen]
-pub struct RawDeformableCreation(Pin<Box<dyn Future<Output = Result<DeformableModel, MethodError>>>>);
+pub struct RawDeformableCreation(Computation<Result<DeformableModel, MethodError>>);
 
 #[wasm_bindgen]
 impl RawDeformableCreation {
@@ -105,7 +121,7 @@ impl RawDeformableCreation {
     pub fn advance(&mut self) -> Result<Option<RawDeformable>, JsValue> {
         match advance(&mut self.0) {
             Poll::Pending => Ok(None),
-            Poll::Ready(model) => Ok(Some(RawDeformable(shared(model)?))),
+            Poll::Ready(model) => Ok(Some(RawDeformable(Stepping::new(model.map_err(Failure::from)?)))),
         }
     }
 }
@@ -127,7 +143,8 @@ impl RawDeformable {
         params: &JsValue,
     ) -> Result<RawDeformable, JsValue> {
         let options = options(volume, frame, start, levels, edge, params)?;
-        Ok(RawDeformable(shared(DeformableModel::new(&volume.0, options))?))
+        let model = DeformableModel::new(&volume.0, options).map_err(Failure::from)?;
+        Ok(RawDeformable(Stepping::new(model)))
     }
 
     /// Returns the largest number of pyramid levels above a volume.
@@ -136,15 +153,25 @@ impl RawDeformable {
         DeformableModel::max_levels(&volume.0)
     }
 
+    /// Does a slice of a step; returns what `step` returns at its end, else undefined.
+    pub fn advance(&self) -> Result<JsValue, JsValue> {
+        self.0.advance().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(report)?))
+    }
+
+    /// Gives up the step that is under way.
+    pub fn discard(&self) {
+        self.0.discard();
+    }
+
     /// Returns the surface as a live mesh, which changes with the model.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh::live(&self.0)
+        RawMesh::live(&Rc::new(RefCell::new(LiveStepping(Rc::clone(&self.0)))))
     }
 
     /// Adds the parts of the iso-surface at π_I of the current pyramid level that the model's surface lacks, unless its
     /// topology is fixed; returns a `StepReport` that counts them as `seeds`.
     pub fn seed(&self) -> Result<JsValue, JsValue> {
-        let report = self.0.borrow_mut().seed().map_err(Failure::from)?;
+        let report = self.ready().seed().map_err(Failure::from)?;
         Ok(to_js(&report)?)
     }
 
@@ -152,7 +179,7 @@ impl RawDeformable {
     /// other; see [`Coverage`].
     #[wasm_bindgen(js_name = surveyCoverage)]
     pub fn survey_coverage(&self) -> Result<RawCoverageSurvey, JsValue> {
-        let survey = self.0.borrow().survey_coverage().map_err(Failure::from)?;
+        let survey = self.ready().survey_coverage().map_err(Failure::from)?;
         Ok(RawCoverageSurvey(Some(survey)))
     }
 
@@ -167,25 +194,25 @@ impl RawDeformable {
             strength,
             radius,
         });
-        self.0.borrow_mut().set_attractors(list.collect()).map_err(Failure::from)?;
+        self.ready().set_attractors(list.collect()).map_err(Failure::from)?;
         Ok(())
     }
 
     /// Returns the index of the current pyramid level; 0 is the volume itself, higher ones are coarser.
     pub fn level(&self) -> usize {
-        self.0.borrow().level()
+        self.ready().level()
     }
 
     /// Returns the lower bound of edge lengths on the current pyramid level, δ, in world units, averaged over
     /// directions if voxels are not cubes.
     pub fn delta(&self) -> f64 {
-        self.0.borrow().delta()
+        self.ready().delta()
     }
 
     /// Returns the speed of each vertex along its outward normal, negative inwards, in world units per unit of time and
     /// in the order of the mesh's arrays.
     pub fn speeds(&self) -> Vec<f32> {
-        self.0.borrow().speeds()
+        self.ready().speeds()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Bindings of the implicit surface and its cameras.
 
-use std::cell::RefCell;
+use std::cell::{RefCell, RefMut};
 use std::rc::Rc;
 
 use js_sys::{Float32Array, Uint8Array};
@@ -50,6 +50,12 @@ impl RawCameras {
 /// The raw handle of the TypeScript class `ImplicitSurface`, which shares the model with the live mesh of its surface.
 #[wasm_bindgen]
 pub struct RawImplicit(Rc<RefCell<ImplicitSurface>>);
+
+impl RawImplicit {
+    fn ready(&self) -> RefMut<'_, ImplicitSurface> {
+        self.0.borrow_mut()
+    }
+}
 
 method_bindings!(RawImplicit, ImplicitSurface, implicitParamSpecs);
 

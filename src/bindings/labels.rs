@@ -83,7 +83,7 @@ impl RawVolume {
 impl RawDeformable {
     /// Adapts the model to its volume after voxels in the region of `dims` voxels from index `min` have changed.
     pub fn refresh(&self, volume: &RawVolume, min: &[u32], dims: &[u32]) -> Result<(), JsValue> {
-        Ok(self.0.borrow_mut().refresh(&volume.0, region(min, dims)?).map_err(Failure::from)?)
+        Ok(self.ready().refresh(&volume.0, region(min, dims)?).map_err(Failure::from)?)
     }
 }
 

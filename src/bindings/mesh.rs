@@ -222,13 +222,7 @@ impl RawMesh {
     /// longer than `max` (1), flips (2); both bounds are in world units. Returns the number of edits; see
     /// [`restructure_in_passes`].
     pub fn restructure(&mut self, min: f64, max: f64, passes: &[u8]) -> Result<u32, JsValue> {
-        let bounds = EdgeBounds { min: min as f32, max: max as f32 };
-        let pass = |code: &u8| match code {
-            0 => RestructurePass::Collapse,
-            1 => RestructurePass::Split,
-            _ => RestructurePass::Flip,
-        };
-        let passes: Vec<_> = passes.iter().map(pass).collect();
+        let (bounds, passes) = (edge_bounds(min, max), passes_of(passes));
         let changes = restructure_in_passes(self.editable()?, bounds, &passes).map_err(Failure::from)?;
         Ok(changes.creations + changes.deletions + changes.inversions)
     }
@@ -244,8 +238,7 @@ impl RawMesh {
 
     /// Remeshes to edge lengths in `min..=max`, in world units; see [`remesh`].
     pub fn remesh(&mut self, min: f64, max: f64) -> Result<(), JsValue> {
-        let bounds = EdgeBounds { min: min as f32, max: max as f32 };
-        remesh(self.editable()?, bounds).map_err(Failure::from)?;
+        remesh(self.editable()?, edge_bounds(min, max)).map_err(Failure::from)?;
         Ok(())
     }
 
@@ -272,11 +265,7 @@ impl RawMesh {
     #[wasm_bindgen(js_name = distanceTo)]
     pub fn distance_to(&self, other: &RawMesh) -> Result<JsValue, JsValue> {
         let found = surface_distance(&self.triangles(), &other.triangles()).map_err(Failure::from)?;
-        let summaries = to_js(&Summaries::from(&found))?;
-        let per_vertex = Float32Array::from(to_f32(&found.per_vertex).as_slice());
-        // Setting a property of a new plain object cannot fail.
-        Reflect::set(&summaries, &"perVertex".into(), &per_vertex).ok();
-        Ok(summaries)
+        Ok(distances(&found)?)
     }
 
     /// Returns the first intersection of a ray with the mesh as a `MeshHit`; undefined if there is none.
@@ -383,9 +372,7 @@ impl RawMesh {
     /// a closed, oriented, manifold mesh, or if the mesh is the live one of a model.
     pub(super) fn editable(&mut self) -> Result<&mut Mesh, Failure> {
         if let MeshKind::Triangles(triangles, versions) = &self.0 {
-            let mut mesh = Mesh::from_triangles(triangles)?;
-            mesh.set_versions(*versions);
-            self.0 = MeshKind::Surface(Box::new(mesh));
+            self.0 = MeshKind::Surface(Box::new(editable_copy(triangles, *versions)?));
         }
         match &mut self.0 {
             MeshKind::Surface(mesh) => Ok(mesh),
@@ -439,6 +426,38 @@ fn copy_into(out: &Float32Array, values: &[f32]) {
 
 pub(super) fn triangle_list(mesh: TriangleMesh) -> MeshKind {
     MeshKind::Triangles(Rc::new(mesh), [0, 0])
+}
+
+/// Returns an editable mesh with the triangles and versions of a list. An error if the list is not a closed, oriented,
+/// manifold mesh.
+pub(super) fn editable_copy(triangles: &TriangleMesh, versions: [u32; 2]) -> Result<Mesh, Failure> {
+    let mut mesh = Mesh::from_triangles(triangles)?;
+    mesh.set_versions(versions);
+    Ok(mesh)
+}
+
+/// Returns bounds of edge lengths in single precision.
+pub(super) fn edge_bounds(min: f64, max: f64) -> EdgeBounds {
+    EdgeBounds { min: min as f32, max: max as f32 }
+}
+
+/// Returns the passes of restructuring for their codes: collapses (0), splits (1), flips (2).
+pub(super) fn passes_of(codes: &[u8]) -> Vec<RestructurePass> {
+    let pass = |code: &u8| match code {
+        0 => RestructurePass::Collapse,
+        1 => RestructurePass::Split,
+        _ => RestructurePass::Flip,
+    };
+    codes.iter().map(pass).collect()
+}
+
+/// Returns distances as a `SurfaceDistance`.
+pub(super) fn distances(found: &SurfaceDistance) -> Result<JsValue, Failure> {
+    let summaries = to_js(&Summaries::from(found))?;
+    let per_vertex = Float32Array::from(to_f32(&found.per_vertex).as_slice());
+    // Setting a property of a new plain object cannot fail.
+    Reflect::set(&summaries, &"perVertex".into(), &per_vertex).ok();
+    Ok(summaries)
 }
 
 /// Returns the failure of an edit of a model's live mesh.

@@ -55,8 +55,12 @@ mod method;
 mod multires;
 #[cfg(feature = "import")]
 mod readers;
+#[cfg(feature = "labels")]
+mod slices;
 #[cfg(all(feature = "sparse", feature = "deformable"))]
 mod sparse;
+#[cfg(any(feature = "deformable", feature = "tracking"))]
+mod stepping;
 mod texture;
 #[cfg(feature = "tracking")]
 mod tracking;

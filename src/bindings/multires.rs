@@ -1,7 +1,10 @@
 //! Bindings of the multiresolution model.
 
-use std::cell::RefCell;
+use std::cell::{RefCell, RefMut};
+use std::future::Future;
+use std::pin::Pin;
 use std::rc::Rc;
+use std::task::Poll;
 
 use js_sys::Float64Array;
 use serde::Serialize;
@@ -13,15 +16,67 @@ use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method::{method_bindings, shared};
 use vesicle::math::DVec3;
 use vesicle::mesh::TriangleMesh;
-use vesicle::methods::LiveSurface;
 use vesicle::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, Support,
 };
+use vesicle::methods::{LiveSurface, MethodError};
+use vesicle::pauses::advance;
+
+/// Returns the options of a model; properties of `params` replace the default parameters.
+fn options(
+    detail: Option<TriangleCopy>,
+    base: Option<TriangleCopy>,
+    ellipsoids: &Float64Array,
+    params: &JsValue,
+    holds_itself: bool,
+) -> Result<MultiresOptions, Failure> {
+    Ok(MultiresOptions {
+        detail: detail.map(|mesh| mesh.0),
+        base: base.map(|mesh| mesh.0),
+        ellipsoids: unpacked(ellipsoids)?,
+        params: with_overrides(&MultiresParams::default(), params)?,
+        support: if holds_itself { Support::Surface } else { Support::Membrane },
+    })
+}
+
+/// A model that is being created in slices.
+#[wasm_bindgen]
+pub struct RawMultiresCreation(Pin<Box<dyn Future<Output = Result<MultiresolutionModel, MethodError>>>>);
+
+#[wasm_bindgen]
+impl RawMultiresCreation {
+    /// Begins to create the model that the constructor of `RawMultires` creates.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        detail: Option<TriangleCopy>,
+        base: Option<TriangleCopy>,
+        ellipsoids: &Float64Array,
+        params: &JsValue,
+        holds_itself: bool,
+    ) -> Result<RawMultiresCreation, JsValue> {
+        let options = options(detail, base, ellipsoids, params, holds_itself)?;
+        Ok(RawMultiresCreation(Box::pin(MultiresolutionModel::begin(options))))
+    }
+
+    /// Does a slice of the work; returns the model at the end, after which this must not be called any more.
+    pub fn advance(&mut self) -> Result<Option<RawMultires>, JsValue> {
+        match advance(&mut self.0) {
+            Poll::Pending => Ok(None),
+            Poll::Ready(model) => Ok(Some(RawMultires(shared(model)?))),
+        }
+    }
+}
 
 /// The raw handle of the TypeScript class `MultiresolutionModel`, which shares the model with the live meshes of its
 /// surfaces.
 #[wasm_bindgen]
 pub struct RawMultires(Rc<RefCell<MultiresolutionModel>>);
+
+impl RawMultires {
+    fn ready(&self) -> RefMut<'_, MultiresolutionModel> {
+        self.0.borrow_mut()
+    }
+}
 
 method_bindings!(RawMultires, MultiresolutionModel, multiresParamSpecs);
 
@@ -66,13 +121,7 @@ impl RawMultires {
         params: &JsValue,
         holds_itself: bool,
     ) -> Result<RawMultires, JsValue> {
-        let options = MultiresOptions {
-            detail: detail.map(|mesh| mesh.0),
-            base: base.map(|mesh| mesh.0),
-            ellipsoids: unpacked(ellipsoids)?,
-            params: with_overrides(&MultiresParams::default(), params)?,
-            support: if holds_itself { Support::Surface } else { Support::Membrane },
-        };
+        let options = options(detail, base, ellipsoids, params, holds_itself)?;
         Ok(RawMultires(shared(MultiresolutionModel::new(options))?))
     }
 

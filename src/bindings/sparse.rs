@@ -7,7 +7,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::{doubles, point, to_js, with_overrides};
 use super::deformable::{RawDeformable, RawStart};
 use super::error::Failure;
-use super::method::shared;
+use super::stepping::Stepping;
 use super::volume::{voxels, world};
 use vesicle::methods::deformable::{DeformableModel, DeformableParams, SparseOptions, WorldBox};
 use vesicle::volume::{BRICK, BrickBox, Region, SparseInit, SparseLevel, SparseVolume, Voxels};
@@ -115,7 +115,8 @@ impl RawDeformable {
         let params = Some(with_overrides(&DeformableParams::for_range(volume.0.range()), params)?);
         let within = within.map(|corners| world_box(&corners)).transpose()?;
         let options = SparseOptions { start: start.0, finest, edge, params, within, whole };
-        Ok(RawDeformable(shared(DeformableModel::on_sparse(&volume.0, options))?))
+        let model = DeformableModel::on_sparse(&volume.0, options).map_err(Failure::from)?;
+        Ok(RawDeformable(Stepping::new(model)))
     }
 }
 

@@ -1,8 +1,7 @@
 //! Bindings of the surface tracker.
 
-use std::cell::{RefCell, RefMut};
+use std::cell::RefCell;
 use std::future::Future;
-use std::pin::Pin;
 use std::rc::Rc;
 use std::task::Poll;
 
@@ -10,98 +9,28 @@ use js_sys::{Float64Array, Uint8Array};
 use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::{bytes, doubles, now, to_js, with_overrides, write_options};
+use super::convert::{bytes, doubles, to_js, with_overrides, write_options};
 use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method;
+use super::stepping::{Computation, LiveStepping, Sliced, Stepping};
 use super::volume::RawVolume;
 use vesicle::io::AnimationWriter;
 use vesicle::math::DVec3;
-use vesicle::mesh::TriangleMesh;
 use vesicle::methods::tracking::{
     Bounds, Cavity, Component, FrameStatistics, Proposal, Query, SurfaceTracker, TrackingOptions,
     TrackingParams,
 };
-use vesicle::methods::{LiveSurface, Method, MethodError, StepReport};
-use vesicle::pauses::{advance, finished};
+use vesicle::methods::{Method, MethodError, StepReport};
+use vesicle::pauses::advance;
 
-type Computation<T> = Pin<Box<dyn Future<Output = T>>>;
-
-/// A tracker, of which a step may be under way: whatever is asked of it then ends it first, so that a step changes all or
-/// nothing for those who look.
-struct Tracking {
-    tracker: Rc<RefCell<SurfaceTracker>>,
-    /// The step under way, which borrows the tracker until it ends or is dropped.
-    step: Option<Computation<Result<StepReport, MethodError>>>,
-    /// The report of a step that was ended by whoever asked for something, until a run takes it.
-    ended: Option<Result<StepReport, MethodError>>,
-}
-
-impl Tracking {
-    fn new(mut tracker: SurfaceTracker) -> Self {
-        tracker.set_clock(now);
-        Self { tracker: Rc::new(RefCell::new(tracker)), step: None, ended: None }
+impl Sliced for SurfaceTracker {
+    fn step_in_slices(&mut self) -> impl Future<Output = Result<StepReport, MethodError>> {
+        self.step_in_slices()
     }
 
-    /// Returns the tracker, after the step that is under way.
-    fn ready(&mut self) -> RefMut<'_, SurfaceTracker> {
-        if let Some(step) = self.step.take() {
-            self.ended = Some(finished(step));
-        }
-        self.tracker.borrow_mut()
-    }
-
-    /// Does a slice of the step that is under way, or begins one; returns its report at its end, or that of one that has ended
-    /// since the last slice.
-    fn advance(&mut self) -> Option<Result<StepReport, MethodError>> {
-        if let Some(report) = self.ended.take() {
-            return Some(report);
-        }
-        let mut step = self.step.take().unwrap_or_else(|| Box::pin(stepped(Rc::clone(&self.tracker))));
-        match advance(&mut step) {
-            Poll::Pending => {
-                self.step = Some(step);
-                None
-            }
-            Poll::Ready(report) => Some(report),
-        }
-    }
-
-    /// Ends the step that is under way without its result.
-    fn discard(&mut self) {
-        self.ended = None;
-        if self.step.take().is_some() {
-            self.tracker.borrow_mut().discard_step();
-        }
-    }
-}
-
-#[allow(
-    clippy::await_holding_refcell_ref,
-    reason = "whoever else wants the tracker ends or drops the step first"
-)]
-async fn stepped(tracker: Rc<RefCell<SurfaceTracker>>) -> Result<StepReport, MethodError> {
-    tracker.borrow_mut().step_in_slices().await
-}
-
-/// The surface of a tracker in the newest frame.
-struct LiveTracking(Rc<RefCell<Tracking>>);
-
-impl LiveSurface for LiveTracking {
-    fn surface(&self) -> TriangleMesh {
-        self.0.borrow_mut().ready().surface()
-    }
-
-    fn origin(&self) -> DVec3 {
-        LiveSurface::origin(&*self.0.borrow_mut().ready())
-    }
-
-    fn counts(&self) -> [usize; 2] {
-        self.0.borrow_mut().ready().counts()
-    }
-
-    fn versions(&self) -> [u32; 2] {
-        self.0.borrow_mut().ready().versions()
+    fn discard_step(&mut self) {
+        self.discard_step();
     }
 }
 
@@ -235,7 +164,7 @@ impl RawTrackerCreation {
 
 /// The raw handle of the TypeScript class `SurfaceTracker`, which shares the tracker with the live mesh of its surface.
 #[wasm_bindgen]
-pub struct RawTracker(Rc<RefCell<Tracking>>);
+pub struct RawTracker(Rc<Stepping<SurfaceTracker>>);
 
 #[wasm_bindgen]
 impl RawTracker {
@@ -262,32 +191,31 @@ impl RawTracker {
     /// Makes `iterations` steps, or fewer if the tracker is done before; returns the `StepReport` of the last step, with the
     /// events of all these steps.
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
-        let report = self.0.borrow_mut().ready().steps(iterations).map_err(Failure::from)?;
+        let report = self.0.ready().steps(iterations).map_err(Failure::from)?;
         Ok(to_js(&report)?)
     }
 
     /// Does a slice of a step; returns its `StepReport` at its end, else undefined.
     pub fn advance(&self) -> Result<JsValue, JsValue> {
-        let report = self.0.borrow_mut().advance().transpose().map_err(Failure::from)?;
+        let report = self.0.advance().transpose().map_err(Failure::from)?;
         report.map_or(Ok(JsValue::UNDEFINED), |report| Ok(to_js(&report)?))
     }
 
     /// Ends the step that is under way without its result.
     pub fn discard(&self) {
-        self.0.borrow_mut().discard();
+        self.0.discard();
     }
 
     /// Returns the current values of all parameters, as a plain object.
     pub fn params(&self) -> Result<JsValue, JsValue> {
-        Ok(to_js(self.0.borrow_mut().ready().params())?)
+        Ok(to_js(self.0.ready().params())?)
     }
 
     /// Sets the parameters that are properties of the plain object `params`, and keeps the others; all are validated
     /// together before any is changed.
     #[wasm_bindgen(js_name = setParams)]
     pub fn set_params(&self, params: &JsValue) -> Result<(), JsValue> {
-        let mut tracking = self.0.borrow_mut();
-        let mut tracker = tracking.ready();
+        let mut tracker = self.0.ready();
         let params = with_overrides(tracker.params(), params)?;
         Ok(tracker.set_params(params).map_err(Failure::from)?)
     }
@@ -295,65 +223,62 @@ impl RawTracker {
     /// Returns the state of the run as bytes, without the input that the tracker was made of, from which `restore` continues
     /// it.
     pub fn save(&self) -> Vec<u8> {
-        self.0.borrow_mut().ready().save()
+        self.0.ready().save()
     }
 
     /// Replaces the run by one that `save` returned, if this tracker was made of the same input, else fails; the run then
     /// continues with the same results, bit for bit.
     pub fn restore(&self, state: &Uint8Array) -> Result<(), JsValue> {
         let state = bytes(state)?;
-        Ok(self.0.borrow_mut().ready().restore(&state).map_err(Failure::from)?)
+        Ok(self.0.ready().restore(&state).map_err(Failure::from)?)
     }
 
     /// Returns a live mesh of the surface in the newest finished frame; before the first one is finished, of the start
     /// surface if there is one, else empty.
     pub fn mesh(&self) -> RawMesh {
-        RawMesh::live(&Rc::new(RefCell::new(LiveTracking(Rc::clone(&self.0)))))
+        RawMesh::live(&Rc::new(RefCell::new(LiveStepping(Rc::clone(&self.0)))))
     }
 
     /// Returns the surface of a finished frame; undefined for other frames.
     #[wasm_bindgen(js_name = meshAt)]
     pub fn mesh_at(&self, frame: usize) -> Option<RawMesh> {
-        let mut tracking = self.0.borrow_mut();
-        let tracker = tracking.ready();
+        let tracker = self.0.ready();
         tracker.meshes().get(frame).map(|mesh| RawMesh(triangle_list(mesh.clone())))
     }
 
     /// Returns the index of the frame that the live mesh shows, the newest finished one; 0 before the first one is
     /// finished.
     pub fn frame(&self) -> usize {
-        self.0.borrow_mut().ready().frame()
+        self.0.ready().frame()
     }
 
     /// Returns the origin in world space of the surfaces and boundary points, three numbers.
     pub fn origin(&self) -> Vec<f64> {
-        self.0.borrow_mut().ready().origin().to_array().to_vec()
+        self.0.ready().origin().to_array().to_vec()
     }
 
     /// Returns three numbers of frames: all in the volume, those in which the image boundary has been found, and those
     /// with a tracked surface.
     pub fn counts(&self) -> Vec<u32> {
-        let mut tracking = self.0.borrow_mut();
-        let tracker = tracking.ready();
+        let tracker = self.0.ready();
         [tracker.frames(), tracker.frames_with_boundary(), tracker.meshes().len()].map(|n| n as u32).to_vec()
     }
 
     /// Returns the boundary points of the image found in a frame, five numbers each: x, y, z relative to the
     /// origin, t in frames, and the weight by boundary votes. Empty until the boundary of the frame is found.
     pub fn boundary(&self, frame: usize) -> Vec<f32> {
-        self.0.borrow_mut().ready().boundary(frame).into_iter().flatten().collect()
+        self.0.ready().boundary(frame).into_iter().flatten().collect()
     }
 
     /// Returns the volume that the surface encloses in each finished frame, in cubed world units.
     pub fn volumes(&self) -> Vec<f64> {
-        self.0.borrow_mut().ready().volumes()
+        self.0.ready().volumes()
     }
 
     /// Returns further results of tracking: the standard deviation of the image noise, in intensity; for a cyclic
     /// sequence, once it is known, the cycle closure error in world units; and the statistics of each finished frame.
     pub fn statistics(&self) -> Result<JsValue, JsValue> {
-        let mut tracking = self.0.borrow_mut();
-        let tracker = tracking.ready();
+        let tracker = self.0.ready();
         let statistics = Statistics {
             noise: tracker.noise(),
             cycle_closure_error: tracker.cycle_closure_error(),
@@ -375,8 +300,7 @@ impl RawTracker {
         unit: &str,
     ) -> Result<Vec<u8>, JsValue> {
         let mut animation = AnimationWriter::new(&write_options(notes, [space, written_as, unit]));
-        let mut tracking = self.0.borrow_mut();
-        let tracker = tracking.ready();
+        let tracker = self.0.ready();
         tracker.meshes().iter().try_for_each(|mesh| animation.add(mesh)).map_err(Failure::from)?;
         Ok(animation.finish(frame_seconds).map_err(Failure::from)?)
     }
@@ -384,7 +308,7 @@ impl RawTracker {
 
 impl RawTracker {
     fn of(tracker: SurfaceTracker) -> Self {
-        Self(Rc::new(RefCell::new(Tracking::new(tracker))))
+        Self(Stepping::new(tracker))
     }
 }
 

@@ -181,12 +181,9 @@ struct Node {
 impl BoxTree {
     /// Builds the tree over `boxes`; queries pass boxes to their callers as items, indices into `boxes`.
     pub fn new(boxes: &[Bounds]) -> Self {
-        let mut items: Vec<(Bounds, u32)> = boxes.iter().copied().zip(0..).collect();
-        let mut nodes = Vec::with_capacity(boxes.len());
-        if !items.is_empty() {
-            build(&mut nodes, &mut items, 0);
-        }
-        Self { nodes, items }
+        let mut builder = BoxTreeBuilder::new(boxes);
+        while builder.advance().is_some() {}
+        builder.finish()
     }
 
     /// Calls `visit` once with each pair of items (indices of boxes) whose boxes overlap, the lower index first. The
@@ -379,26 +376,66 @@ impl BoxTree {
     }
 }
 
-/// Builds the subtree of `items`, which it reorders, and appends its nodes to `nodes`; items are split at the median of
-/// their boxes' centres along the widest axis. `first` is the index of the first of them among all items of the tree.
-fn build(nodes: &mut Vec<Node>, items: &mut [(Bounds, u32)], first: usize) {
-    let bounds = items.iter().fold(Bounds::EMPTY, |b, (item, _)| b.union(item));
-    let at = nodes.len();
-    if items.len() <= LEAF {
-        nodes.push(Node { bounds, link: first as u32, count: items.len() as u32 });
-        return;
+/// A [`BoxTree`] that is being built, node by node.
+#[derive(Debug)]
+pub struct BoxTreeBuilder {
+    tree: BoxTree,
+    /// Subtrees to be built, the next one last.
+    pending: Vec<Subtree>,
+}
+
+/// A subtree to be built.
+#[derive(Debug)]
+struct Subtree {
+    /// The range of its items among all items of the tree.
+    items: Range<usize>,
+    /// The node of which it is the second child, if it is one.
+    second_of: Option<usize>,
+}
+
+impl BoxTreeBuilder {
+    /// Begins to build the tree over `boxes`.
+    pub fn new(boxes: &[Bounds]) -> Self {
+        let items: Vec<(Bounds, u32)> = boxes.iter().copied().zip(0..).collect();
+        let whole = Subtree { items: 0..items.len(), second_of: None };
+        let pending = if items.is_empty() { Vec::new() } else { vec![whole] };
+        Self { tree: BoxTree { nodes: Vec::with_capacity(items.len()), items }, pending }
     }
-    nodes.push(Node { bounds, link: 0, count: 0 });
-    let (axis, middle) = (bounds.widest_axis(), items.len() / 2);
-    let mut ranked: Vec<(u64, u32)> =
-        items.iter().map(|(b, i)| combined_rank(rank_f32(b.min[axis] + b.max[axis]), *i)).zip(0..).collect();
-    select_least(&mut ranked, middle);
-    let before = items.to_vec();
-    items.iter_mut().zip(ranked).for_each(|(item, (_, i))| *item = before[i as usize]);
-    let (left, right) = items.split_at_mut(middle);
-    build(nodes, left, first);
-    nodes[at].link = nodes.len() as u32;
-    build(nodes, right, first + middle);
+
+    /// Appends the next node, whose items are split at the median of their boxes' centres along the widest axis; returns
+    /// the number of its items, `None` if the tree is complete.
+    pub fn advance(&mut self) -> Option<usize> {
+        let Subtree { items: range, second_of } = self.pending.pop()?;
+        let (nodes, items) = (&mut self.tree.nodes, &mut self.tree.items[range.clone()]);
+        let at = nodes.len();
+        if let Some(parent) = second_of {
+            nodes[parent].link = at as u32;
+        }
+        let bounds = items.iter().fold(Bounds::EMPTY, |b, (item, _)| b.union(item));
+        if items.len() <= LEAF {
+            nodes.push(Node { bounds, link: range.start as u32, count: items.len() as u32 });
+            return Some(items.len());
+        }
+        nodes.push(Node { bounds, link: 0, count: 0 });
+        let axis = bounds.widest_axis();
+        let mut ranked: Vec<(u64, u32)> = items
+            .iter()
+            .map(|(b, i)| combined_rank(rank_f32(b.min[axis] + b.max[axis]), *i))
+            .zip(0..)
+            .collect();
+        select_least(&mut ranked, items.len() / 2);
+        let before = items.to_vec();
+        items.iter_mut().zip(ranked).for_each(|(item, (_, i))| *item = before[i as usize]);
+        let middle = range.start + items.len() / 2;
+        self.pending.push(Subtree { items: middle..range.end, second_of: Some(at) });
+        self.pending.push(Subtree { items: range.start..middle, second_of: None });
+        Some(range.len())
+    }
+
+    /// Returns the tree, once it is complete.
+    pub fn finish(self) -> BoxTree {
+        self.tree
+    }
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use super::obstacles::Obstacles;
 use crate::math::predicates::collinear;
 use crate::math::{DVec3, Quadric, Vec3, triangle};
 use crate::mesh::{Facet, Mesh, MeshError, VertexId};
+use crate::pauses::{Pauses, finished};
 use smallvec::SmallVec;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -38,6 +39,15 @@ const WORK_PER_TRIANGLE: u64 = 2_000;
 /// The constant part of the work limit, in the units of [`WORK_PER_TRIANGLE`], for small meshes.
 const WORK_AT_LEAST: u64 = 10_000_000;
 
+/// The number of boxes and triangles tested, or points of the mesh before, that are a unit of work.
+const TESTS_PER_UNIT: usize = 64;
+
+/// The number of edges that are queued between two counts of the work, and their units of work.
+const QUEUED: [usize; 2] = [64, 8];
+
+/// The units of work of an attempt to collapse an edge, besides its tests.
+const ATTEMPT: usize = 4;
+
 /// Decimates a mesh: collapses edges in the order of their quadric error until at most `target_triangles` are left, no
 /// safe collapse is found (rejected edges are tried again, in up to four passes in all), or the work limit is reached,
 /// as among thousands of needles that block each other. Returns the number of collapses, each of which removes two
@@ -46,10 +56,15 @@ const WORK_AT_LEAST: u64 = 10_000_000;
 /// A component keeps at least four triangles. Intersecting triangles are kept unless a collapse resolves the
 /// intersection. The vertex that remains after a collapse has the mean attributes of both ends.
 pub fn decimate(mesh: &mut Mesh, target_triangles: usize) -> usize {
+    finished(decimate_in_slices(mesh, target_triangles, &Pauses::default()))
+}
+
+/// Does what [`decimate`] does, and pauses meanwhile. The mesh is valid in each pause.
+pub async fn decimate_in_slices(mesh: &mut Mesh, target_triangles: usize, pauses: &Pauses) -> usize {
     if mesh.triangle_count() <= target_triangles {
         return 0;
     }
-    run(mesh, target_triangles, Box::new(Unconditional))
+    run(mesh, target_triangles, Box::new(Unconditional), pauses).await
 }
 
 /// Decimates a mesh as [`decimate`], and rejects collapses after which the distance from the mesh before would be
@@ -65,6 +80,19 @@ pub fn decimate_within(
     target_triangles: usize,
     max_distance: f64,
 ) -> Result<usize, MeshError> {
+    finished(decimate_within_in_slices(mesh, target_triangles, max_distance, &Pauses::default()))
+}
+
+/// Does what [`decimate_within`] does, and pauses meanwhile. The mesh is valid in each pause.
+///
+/// # Errors
+/// As [`decimate_within`].
+pub async fn decimate_within_in_slices(
+    mesh: &mut Mesh,
+    target_triangles: usize,
+    max_distance: f64,
+    pauses: &Pauses,
+) -> Result<usize, MeshError> {
     if max_distance.is_nan() || max_distance < 0.0 {
         let problem = format!("must be at least 0, got {max_distance}");
         return Err(MeshError::InvalidArgument { parameter: "max_distance", problem });
@@ -72,21 +100,29 @@ pub fn decimate_within(
     if mesh.triangle_count() <= target_triangles {
         return Ok(0);
     }
-    let deviation = Deviation::new(mesh, max_distance)?;
-    Ok(run(mesh, target_triangles, Box::new(deviation)))
+    let deviation = Deviation::new(mesh, max_distance, pauses).await?;
+    pauses.now().await;
+    Ok(run(mesh, target_triangles, Box::new(deviation), pauses).await)
 }
 
-fn run(mesh: &mut Mesh, target_triangles: usize, condition: Box<dyn Condition>) -> usize {
+async fn run(
+    mesh: &mut Mesh,
+    target_triangles: usize,
+    condition: Box<dyn Condition>,
+    pauses: &Pauses,
+) -> usize {
     let before = mesh.vertex_count();
-    let mut decimation = Decimation::new(mesh, target_triangles, condition);
+    let mut decimation = Decimation::new(mesh, target_triangles, condition, pauses).await;
     for _ in 0..ROUNDS {
+        pauses.now().await;
         let vertices = decimation.mesh.vertex_count();
-        decimation.queue_all();
-        decimation.run();
+        decimation.queue_all(pauses).await;
+        decimation.run(pauses).await;
         if decimation.is_done() || decimation.mesh.vertex_count() == vertices {
             break;
         }
     }
+    pauses.now().await;
     mesh.reorder();
     before - mesh.vertex_count()
 }
@@ -99,6 +135,9 @@ pub(super) trait Condition {
 
     /// Adopts the collapse of the edge that was allowed last, before it is made.
     fn adopt(&mut self, mesh: &Mesh, edge: [VertexId; 2]);
+
+    /// Returns the number of tests so far, of points of the mesh before.
+    fn tests(&self) -> u64;
 }
 
 /// Allows all collapses.
@@ -110,6 +149,10 @@ impl Condition for Unconditional {
     }
 
     fn adopt(&mut self, _: &Mesh, _: [VertexId; 2]) {}
+
+    fn tests(&self) -> u64 {
+        0
+    }
 }
 
 struct Decimation<'a> {
@@ -144,16 +187,18 @@ struct Candidate {
 type RatedPosition = (f64, Vec3);
 
 impl<'a> Decimation<'a> {
-    fn new(mesh: &'a mut Mesh, target: usize, condition: Box<dyn Condition>) -> Self {
+    async fn new(mesh: &'a mut Mesh, target: usize, condition: Box<dyn Condition>, pauses: &Pauses) -> Self {
         let origin = mesh.vertices().next().map_or(DVec3::ZERO, |v| mesh.position(v).as_dvec3());
         let work = WORK_AT_LEAST + WORK_PER_TRIANGLE * mesh.triangle_count() as u64;
+        let quadrics = quadrics(mesh, origin);
+        pauses.now().await;
         Self {
             target,
-            quadrics: quadrics(mesh, origin),
+            quadrics,
             origin,
             stamps: vec![0; mesh.slots()],
             queue: BinaryHeap::new(),
-            obstacles: Obstacles::new(mesh, work),
+            obstacles: Obstacles::in_slices(mesh, work, pauses).await,
             condition,
             mesh,
         }
@@ -163,19 +208,31 @@ impl<'a> Decimation<'a> {
         self.mesh.triangle_count() <= self.target || self.obstacles.is_exhausted()
     }
 
-    fn queue_all(&mut self) {
+    async fn queue_all(&mut self, pauses: &Pauses) {
         let edges: Vec<_> = self.mesh.edges().collect();
-        edges.into_iter().for_each(|(u, v)| self.enqueue(u, v, 0));
+        let [at_once, work] = QUEUED;
+        for some in edges.chunks(at_once) {
+            some.iter().for_each(|&(u, v)| self.enqueue(u, v, 0));
+            pauses.after(work).await;
+        }
     }
 
-    fn run(&mut self) {
+    async fn run(&mut self, pauses: &Pauses) {
+        let mut before = self.tests();
         while !self.is_done() {
             let Some(Reverse(candidate)) = self.queue.pop() else { return };
             let [u, v] = candidate.ends;
             if candidate.stamp == self.stamp(u, v) {
                 self.attempt(u, v, candidate.choice);
+                let tests = self.tests();
+                pauses.after(ATTEMPT + (tests - before) as usize / TESTS_PER_UNIT).await;
+                before = tests;
             }
         }
+    }
+
+    fn tests(&self) -> u64 {
+        self.obstacles.tests() + self.condition.tests()
     }
 
     /// Collapses the edge `uv` into its candidate position number `choice` if that is safe; otherwise queues the edge
@@ -313,7 +370,7 @@ mod tests {
     #[test]
     fn the_best_place_comes_first() {
         let mut mesh = Mesh::icosphere(Vec3::splat(100.0), 1.0, 0.3).unwrap();
-        let decimation = Decimation::new(&mut mesh, 4, Box::new(Unconditional));
+        let decimation = finished(Decimation::new(&mut mesh, 4, Box::new(Unconditional), &Pauses::default()));
         for (u, v) in decimation.mesh.edges() {
             let positions = decimation.positions(u, v);
             assert_eq!(positions.len(), 4);

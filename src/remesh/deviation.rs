@@ -8,6 +8,7 @@
 use super::decimate::Condition;
 use crate::math::{Vec3, triangle};
 use crate::mesh::{Facet, Mesh, MeshError, VertexId};
+use crate::pauses::Pauses;
 use crate::spatial::TriangleTree;
 
 /// The vertices of the mesh before decimation, and their witnesses.
@@ -21,21 +22,24 @@ pub(super) struct Deviation {
     at: Vec<Vec<u32>>,
     /// The points whose witnesses the collapse tested last removes, and their new ones.
     found: Vec<(u32, [u32; 3])>,
+    /// The number of points tested so far, those whose witness is kept included.
+    tests: u64,
 }
 
 impl Deviation {
-    /// Creates the bound `tolerance`, in the length unit of the mesh, of the distance from the present mesh.
+    /// Creates the bound `tolerance`, in the length unit of the mesh, of the distance from the present mesh; pauses meanwhile.
     ///
     /// # Errors
     /// As [`TriangleTree::new`].
-    pub fn new(mesh: &Mesh, tolerance: f64) -> Result<Self, MeshError> {
+    pub async fn new(mesh: &Mesh, tolerance: f64, pauses: &Pauses) -> Result<Self, MeshError> {
         let mut deviation = Self {
             tolerance,
-            before: TriangleTree::new(&mesh.to_triangles())?,
+            before: TriangleTree::in_slices(&mesh.to_triangles(), pauses).await?,
             points: Vec::new(),
             witnesses: Vec::new(),
             at: vec![Vec::new(); mesh.slots()],
             found: Vec::new(),
+            tests: 0,
         };
         for v in mesh.vertices() {
             if let Some((a, b)) = mesh.ring(v).pairs().next() {
@@ -56,6 +60,7 @@ impl Condition for Deviation {
         self.found.clear();
         let reach = self.tolerance * self.tolerance;
         for w in around(mesh, [u, v]) {
+            self.tests += self.at[w.index()].len() as u64;
             for &point in &self.at[w.index()] {
                 if !is_removed(&self.witnesses[point as usize], [u, v]) {
                     continue;
@@ -78,6 +83,10 @@ impl Condition for Deviation {
             self.witnesses[point as usize] = witness;
             self.at[witness[0] as usize].push(point);
         }
+    }
+
+    fn tests(&self) -> u64 {
+        self.tests
     }
 }
 

@@ -30,14 +30,14 @@ mod volume_balance;
 
 pub use changes::Changes;
 pub use clustering::clustered;
-pub use decimate::{decimate, decimate_within};
+pub use decimate::{decimate, decimate_in_slices, decimate_within, decimate_within_in_slices};
 pub use embedding::{Embedding, PairsOfParts};
-pub use isotropic::remesh;
+pub use isotropic::{remesh, remesh_in_slices};
 pub use plane_cut::{Plane, cut_by_plane};
 pub use resolve::{ContactPolicy, Pending, Resolver, TopologyGuide, Unguided};
 pub use restructure::{
-    EdgeBounds, EditPolicy, RestructurePass, Unchecked, collapse_short, flip_for_valence, restructure,
-    restructure_in_passes, split_long,
+    EdgeBounds, EditPolicy, RestructurePass, Unchecked, collapse_short, flip_for_valence, passes_in_slices,
+    restructure, restructure_in_passes, restructure_in_slices, split_long,
 };
 pub use sampling::Sampling;
 pub use smooth::{Smoothing, smooth};

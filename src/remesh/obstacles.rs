@@ -4,6 +4,7 @@
 use crate::math::order::sort_pairs;
 use crate::math::{Bounds, Vec3, triangle};
 use crate::mesh::{Facet, Mesh, VertexId, facets_intersect};
+use crate::pauses::Pauses;
 
 /// A bounding volume hierarchy over the one-rings of all vertices, with which decimation tests for intersections: a
 /// balanced tree of boxes in the order of a space-filling curve.
@@ -22,13 +23,16 @@ pub(super) struct Obstacles {
     /// The remaining work budget of decimation, in boxes visited and pairs of triangles tested; see
     /// [`Self::is_exhausted`].
     work_left: u64,
+    work: u64,
     stack: Vec<u32>,
 }
 
 impl Obstacles {
-    /// Builds the tree of `mesh`, with a work budget of `work` visited boxes and tested pairs of triangles.
-    pub fn new(mesh: &Mesh, work: u64) -> Self {
+    /// Builds the tree of `mesh`, with a work budget of `work` visited boxes and tested pairs of triangles; pauses
+    /// meanwhile.
+    pub async fn in_slices(mesh: &Mesh, work: u64, pauses: &Pauses) -> Self {
         let vertices = in_curve_order(mesh);
+        pauses.now().await;
         let first_leaf = vertices.len().next_power_of_two();
         let mut leaves = vec![0; mesh.slots()];
         let mut nodes = vec![Bounds::EMPTY; 2 * first_leaf];
@@ -39,8 +43,14 @@ impl Obstacles {
         for i in (1..first_leaf).rev() {
             nodes[i] = nodes[2 * i].union(&nodes[2 * i + 1]);
         }
+        pauses.now().await;
         let components = components(mesh);
-        Self { nodes, leaves, vertices, components, work_left: work, stack: Vec::new() }
+        Self { nodes, leaves, vertices, components, work_left: work, work, stack: Vec::new() }
+    }
+
+    /// Returns the number of boxes visited and pairs of triangles tested so far.
+    pub fn tests(&self) -> u64 {
+        self.work - self.work_left
     }
 
     /// Returns whether the triangles `fresh` may not replace the one-rings of `replaced`: they have more than common
@@ -223,8 +233,13 @@ fn spread(cell: u32) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn obstacles(mesh: &Mesh, work: u64) -> Obstacles {
+        finished(Obstacles::in_slices(mesh, work, &Pauses::default()))
+    }
 
     /// Returns two adjacent spheres, a vertex `v` of the first, and the triangles around it after a move to `position`.
     fn moved(position: Vec3) -> (Mesh, VertexId, Vec<Facet>) {
@@ -254,7 +269,7 @@ mod tests {
             [(1.0, false), (1.05, false), (1.3, true), (5.0, true), (-0.5, false), (-1.3, true)]
         {
             let (mesh, v, fan) = moved(Vec3::X * x);
-            assert_eq!(Obstacles::new(&mesh, u64::MAX).blocks(&mesh, &fan, &[v]), expected, "{x}");
+            assert_eq!(obstacles(&mesh, u64::MAX).blocks(&mesh, &fan, &[v]), expected, "{x}");
         }
     }
 
@@ -265,14 +280,14 @@ mod tests {
             let other = mesh.vertices().find(|&w| mesh.position(w).x > 1.1).unwrap();
             mesh.remove_component(other);
             mesh.append(&Mesh::icosahedron(Vec3::X * 1.1, 0.01)).unwrap();
-            assert_eq!(Obstacles::new(&mesh, u64::MAX).blocks(&mesh, &fan, &[v]), expected, "{x}");
+            assert_eq!(obstacles(&mesh, u64::MAX).blocks(&mesh, &fan, &[v]), expected, "{x}");
         }
     }
 
     #[test]
     fn an_updated_tree_equals_a_new_one() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.2).unwrap();
-        let mut updated = Obstacles::new(&mesh, u64::MAX);
+        let mut updated = obstacles(&mesh, u64::MAX);
         let mut collapses = 0;
         for i in 0..300 {
             let (u, v) = mesh.edges().nth(i * 7 % mesh.edge_count()).unwrap();
@@ -292,9 +307,8 @@ mod tests {
     #[test]
     fn work_ends() {
         let (mesh, v, fan) = moved(Vec3::X);
-        let mut obstacles = Obstacles::new(&mesh, 1000);
-        let visited =
-            (0..1000).take_while(|_| !obstacles.blocks(&mesh, &fan, &[v]) && !obstacles.is_exhausted());
+        let mut tree = obstacles(&mesh, 1000);
+        let visited = (0..1000).take_while(|_| !tree.blocks(&mesh, &fan, &[v]) && !tree.is_exhausted());
         assert!((2..50).contains(&visited.count()));
     }
 

@@ -227,8 +227,10 @@ impl Resolver {
         self.edited.clear();
         self.edits.clear();
         let stuck = std::mem::take(&mut self.stuck);
-        self.remove_crushed(mesh, sampling, guide, &stuck);
+        pauses.now().await;
+        self.remove_crushed(mesh, sampling, guide, &stuck, pauses).await;
         self.cut_stuck_necks(mesh, sampling, guide, &stuck);
+        pauses.now().await;
         for &v in active {
             self.touch(v);
         }
@@ -245,7 +247,7 @@ impl Resolver {
         if self.contact_policy == ContactPolicy::Leave {
             self.take_dirty();
         }
-        self.update_small_components(mesh, sampling, guide);
+        self.update_small_components(mesh, sampling, guide, pauses).await;
         self.changes
     }
 
@@ -272,13 +274,26 @@ impl Resolver {
         moving: &[VertexId],
         displacements: &mut [Vec3],
     ) -> Vec<(VertexId, f32)> {
+        finished(self.move_some_in_slices(mesh, sampling, moving, displacements, &Pauses::default()))
+    }
+
+    /// Does what [`Self::move_some`] does, and pauses meanwhile.
+    pub async fn move_some_in_slices(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        moving: &[VertexId],
+        displacements: &mut [Vec3],
+        pauses: &Pauses,
+    ) -> Vec<(VertexId, f32)> {
         self.small.find(mesh);
         // After a call for the whole mesh they have memory for as many vertices.
         self.queue.shrink_to_fit();
         self.dirty.shrink_to_fit();
         self.edited = Vec::new();
         self.embedding.sync_with_edge(mesh, sampling.longest());
-        let held = self.embedding.move_some(mesh, moving, displacements);
+        pauses.now().await;
+        let held = self.embedding.move_some_in_slices(mesh, moving, displacements, pauses).await;
         self.stuck.clear();
         self.stuck.extend(held.iter().filter(|(_, share)| *share == 0.0).map(|(v, _)| *v));
         held
@@ -309,13 +324,19 @@ impl Resolver {
     }
 
     /// Refines the mesh as [`Embedding::refine`] does, and returns whether it was refined; `sampling` is that of the
-    /// mesh before the refinement.
+    /// mesh before the refinement. Pauses meanwhile.
     ///
     /// # Errors
     /// As [`Mesh::refine`].
-    pub fn refine(&mut self, mesh: &mut Mesh, sampling: Sampling) -> Result<bool, MeshError> {
+    pub async fn refine_in_slices(
+        &mut self,
+        mesh: &mut Mesh,
+        sampling: Sampling,
+        pauses: &Pauses,
+    ) -> Result<bool, MeshError> {
         self.embedding.sync_with_edge(mesh, sampling.longest());
-        self.embedding.refine(mesh)
+        pauses.now().await;
+        self.embedding.refine_in_slices(mesh, pauses).await
     }
 
     /// Renumbers the vertices of the mesh as [`Mesh::reorder`] does, also those that the last call of [`Self::resolve`] left

@@ -9,6 +9,8 @@ use super::{Changes, Embedding};
 use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::math::{Vec3, triangle};
 use crate::mesh::{EditError, MAX_VERTICES, Mesh, MeshError, OppositeVertices, VertexId};
+use crate::pauses::{Pauses, finished};
+use std::ops::Range;
 
 /// The shortest and the longest edge allowed (ε_min and ε_max of Kobbelt, Bareuther & Seidel), in units of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,6 +111,11 @@ pub trait EditPolicy {
 
     /// Called after an edge at `u` was split by the new vertex `fresh`, to update the data of a policy.
     fn was_split(&mut self, _fresh: VertexId, _u: VertexId) {}
+
+    /// Returns the work of all tests so far, counted in nearby vertices visited; 0 without tests.
+    fn effort(&self) -> u64 {
+        0
+    }
 }
 
 /// An [`EditPolicy`] without tests for self-intersections: ten times as fast as with an [`Embedding`]. The caller
@@ -134,6 +141,10 @@ impl EditPolicy for Embedding {
     ) -> Result<T, EditError> {
         Self::attempt(self, mesh, edit)
     }
+
+    fn effort(&self) -> u64 {
+        Self::effort(self)
+    }
 }
 
 /// The cosine of the largest angle by which an edit may turn a triangle, 78°. A larger angle lets folds develop over
@@ -155,12 +166,56 @@ const PASSES: usize = 24;
 /// unless the edge is as short as the spacing of coordinates.
 const HALVED: f32 = 0.5;
 
+/// The number of slots, or edges, that a pass visits between two counts of its work.
+const CHUNK: usize = 32;
+
+/// The number of units of work that a chunk counts as, besides its tests for self-intersections.
+const CHUNK_WORK: usize = 4;
+
+/// The number of nearby vertices visited that are a unit of work.
+const EFFORT_PER_UNIT: u64 = 16;
+
+/// The work of a pass.
+pub(super) struct Work<'a> {
+    pauses: &'a Pauses,
+    /// The effort of the edit policy when work was last counted.
+    effort: u64,
+}
+
+impl<'a> Work<'a> {
+    pub fn new(edits: &impl EditPolicy, pauses: &'a Pauses) -> Self {
+        Self { pauses, effort: edits.effort() }
+    }
+
+    /// Counts the work of a chunk.
+    pub async fn count(&mut self, edits: &impl EditPolicy) {
+        let before = std::mem::replace(&mut self.effort, edits.effort());
+        let tests = self.effort.saturating_sub(before) / EFFORT_PER_UNIT;
+        self.pauses.after(CHUNK_WORK + tests as usize).await;
+    }
+}
+
+/// Returns the slots up to `end` in chunks.
+pub(super) fn chunks(end: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..end).step_by(CHUNK).map(move |first| first..end.min(first + CHUNK))
+}
+
 /// Performs one round of restructuring: collapses short edges, splits long ones, and flips edges to bring valences near
 /// six. Rejected edits are skipped, and there are no splits beyond [`MAX_VERTICES`]. Returns the numbers of edits.
 pub fn restructure(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
-    let mut changes = collapse_short(mesh, bounds, edits);
-    changes += split_long(mesh, bounds, MAX_VERTICES, edits);
-    changes += flip_for_valence(mesh, bounds, edits);
+    finished(restructure_in_slices(mesh, bounds, edits, &Pauses::default()))
+}
+
+/// Does what [`restructure()`] does, and pauses meanwhile.
+pub async fn restructure_in_slices(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    edits: &mut impl EditPolicy,
+    pauses: &Pauses,
+) -> Changes {
+    let mut changes = collapse_short(mesh, bounds, edits, pauses).await;
+    changes += split_long(mesh, bounds, MAX_VERTICES, edits, pauses).await;
+    changes += flip_for_valence(mesh, bounds, edits, pauses).await;
     changes
 }
 
@@ -185,25 +240,42 @@ pub fn restructure_in_passes(
     bounds: EdgeBounds,
     passes: &[RestructurePass],
 ) -> Result<Changes, MeshError> {
+    finished(passes_in_slices(mesh, bounds, passes, &Pauses::default()))
+}
+
+/// Does what [`restructure_in_passes`] does, and pauses meanwhile.
+///
+/// # Errors
+/// As [`restructure_in_passes`].
+pub async fn passes_in_slices(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    passes: &[RestructurePass],
+    pauses: &Pauses,
+) -> Result<Changes, MeshError> {
     bounds.check_for(mesh)?;
-    run_passes(mesh, bounds, passes, MAX_VERTICES)
+    pauses.now().await;
+    run_passes(mesh, bounds, passes, MAX_VERTICES, pauses).await
 }
 
 /// Does what [`restructure_in_passes`] does, with at most `most` vertices, and unchecked bounds.
-fn run_passes(
+async fn run_passes(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
     passes: &[RestructurePass],
     most: usize,
+    pauses: &Pauses,
 ) -> Result<Changes, MeshError> {
     let before = passes.contains(&RestructurePass::Split).then(|| mesh.clone());
     let mut changes = Changes::default();
+    let edits = &mut Unchecked;
     for pass in passes {
         changes += match pass {
-            RestructurePass::Collapse => collapse_short(mesh, bounds, &mut Unchecked),
-            RestructurePass::Split => split_long(mesh, bounds, most, &mut Unchecked),
-            RestructurePass::Flip => flip_for_valence(mesh, bounds, &mut Unchecked),
+            RestructurePass::Collapse => collapse_short(mesh, bounds, edits, pauses).await,
+            RestructurePass::Split => split_long(mesh, bounds, most, edits, pauses).await,
+            RestructurePass::Flip => flip_for_valence(mesh, bounds, edits, pauses).await,
         };
+        pauses.now().await;
         let left = if mesh.vertex_count() >= most { long_edges(mesh, bounds).count() } else { 0 };
         if let Some(before) = before.as_ref().filter(|_| left > 0 && *pass == RestructurePass::Split) {
             let vertices = (mesh.vertex_count() + left) as u64;
@@ -222,11 +294,31 @@ fn long_edges(mesh: &Mesh, bounds: EdgeBounds) -> impl Iterator<Item = (f32, (Ve
 }
 
 /// Collapses edges shorter than the lower bound into the end of higher valence, or into the other if that is rejected
-/// (Kobbelt, Bareuther & Seidel, figure 4); returns the number of collapses.
-pub fn collapse_short(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
+/// (Kobbelt, Bareuther & Seidel, figure 4), and pauses meanwhile; returns the number of collapses.
+pub async fn collapse_short(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    edits: &mut impl EditPolicy,
+    pauses: &Pauses,
+) -> Changes {
+    let (mut changes, mut work) = (Changes::default(), Work::new(edits, pauses));
+    for slots in chunks(mesh.slots()) {
+        changes += collapse_short_at(mesh, bounds, edits, slots);
+        work.count(edits).await;
+    }
+    changes
+}
+
+/// Collapses short edges at the vertices in some slots, as [`collapse_short`].
+fn collapse_short_at(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    edits: &mut impl EditPolicy,
+    slots: Range<usize>,
+) -> Changes {
     let mut changes = Changes::default();
     let shortest = bounds.min * bounds.min;
-    for slot in 0..mesh.slots() {
+    for slot in slots {
         let u = VertexId::from_index(slot);
         // The remaining vertex is processed again until none of its edges can be collapsed.
         while let Some((kept, removed)) = short_edge(mesh, u, shortest, |kept, removed| {
@@ -305,29 +397,25 @@ pub(super) fn faces_alike(before: Vec3, after: Vec3) -> bool {
 }
 
 /// Splits edges longer than the upper bound at their midpoint, longest first, until there are none (Kobbelt, Bareuther
-/// & Seidel, figure 5) or the mesh has `most` vertices; rejected splits are skipped. Returns the number of splits.
-pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut impl EditPolicy) -> Changes {
-    let mut changes = Changes::default();
+/// & Seidel, figure 5) or the mesh has `most` vertices; rejected splits are skipped. Pauses meanwhile. Returns the number
+/// of splits.
+pub async fn split_long(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    most: usize,
+    edits: &mut impl EditPolicy,
+    pauses: &Pauses,
+) -> Changes {
+    let (mut changes, mut work) = (Changes::default(), Work::new(edits, pauses));
     for _ in 0..PASSES {
         let before = changes.creations;
         let mut long: Vec<_> = long_edges(mesh, bounds).collect();
         sort_by_rank(&mut long, |&(_, (u, v))| combined_rank(u.0, v.0));
         sort_by_rank(&mut long, |&(square, _)| (!rank_f32(square)).into());
-        for (square, (u, v)) in long {
-            if mesh.vertex_count() >= most {
-                return changes;
-            }
-            let ends = [u, v].map(|end| mesh.position(end));
-            let middle = (ends[0] + ends[1]) * 0.5;
-            // Rounded towards one end, it makes no progress. Also rejects NaN.
-            let is_halved = |end: Vec3| end.distance_squared(middle) < HALVED * square;
-            if !ends.into_iter().all(is_halved) {
-                continue;
-            }
-            if let Ok(fresh) = edits.attempt(mesh, |mesh| mesh.split(u, v, middle)) {
-                edits.was_split(fresh, u);
-                changes.creations += 1;
-            }
+        pauses.now().await;
+        for some in long.chunks(CHUNK) {
+            changes += split_edges(mesh, some, most, edits);
+            work.count(edits).await;
         }
         if changes.creations == before {
             break;
@@ -336,31 +424,81 @@ pub fn split_long(mesh: &mut Mesh, bounds: EdgeBounds, most: usize, edits: &mut 
     changes
 }
 
+/// Splits edges, given with their squared lengths, at their midpoints until the mesh has `most` vertices.
+fn split_edges(
+    mesh: &mut Mesh,
+    long: &[(f32, (VertexId, VertexId))],
+    most: usize,
+    edits: &mut impl EditPolicy,
+) -> Changes {
+    let mut changes = Changes::default();
+    for &(square, (u, v)) in long {
+        if mesh.vertex_count() >= most {
+            return changes;
+        }
+        let ends = [u, v].map(|end| mesh.position(end));
+        let middle = (ends[0] + ends[1]) * 0.5;
+        // Rounded towards one end, it makes no progress. Also rejects NaN.
+        let is_halved = |end: Vec3| end.distance_squared(middle) < HALVED * square;
+        if !ends.into_iter().all(is_halved) {
+            continue;
+        }
+        if let Ok(fresh) = edits.attempt(mesh, |mesh| mesh.split(u, v, middle)) {
+            edits.was_split(fresh, u);
+            changes.creations += 1;
+        }
+    }
+    changes
+}
+
 /// Flips edges where that is allowed and lowers the sum of (valence − 6)² over the four corners around them (Kobbelt,
 /// Bareuther & Seidel, figure 6). Allowed are flips that `may_flip` and `edits` permit. Ends when a pass flips none, or
-/// after `PASSES` passes. Returns the number of flips.
-pub fn flip_for_valence(mesh: &mut Mesh, bounds: EdgeBounds, edits: &mut impl EditPolicy) -> Changes {
-    let mut changes = Changes::default();
+/// after `PASSES` passes. Pauses meanwhile. Returns the number of flips.
+pub async fn flip_for_valence(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    edits: &mut impl EditPolicy,
+    pauses: &Pauses,
+) -> Changes {
+    let (mut changes, mut work) = (Changes::default(), Work::new(edits, pauses));
     // Vertices whose edges have to be tested again since a flip changed valences near them.
     let mut stale = vec![true; mesh.slots()];
     for _ in 0..PASSES {
         let before = changes.inversions;
-        for slot in 0..mesh.slots() {
-            if !std::mem::replace(&mut stale[slot], false) {
-                continue;
-            }
-            let u = VertexId::from_index(slot);
-            let mut k = 0;
-            while let Some(&v) = mesh.ring(u).as_slice().get(k) {
-                k += 1;
-                if u < v && flip_if_wanted(mesh, bounds, [u, v], edits, &mut stale) {
-                    changes.inversions += 1;
-                    k -= 1;
-                }
+        for slots in chunks(mesh.slots()) {
+            if stale[slots.clone()].contains(&true) {
+                changes += flip_for_valence_at(mesh, bounds, edits, &mut stale, slots);
+                work.count(edits).await;
             }
         }
         if changes.inversions == before {
             break;
+        }
+    }
+    changes
+}
+
+/// Flips edges at the vertices in some slots that are `stale`, as [`flip_for_valence`].
+fn flip_for_valence_at(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    edits: &mut impl EditPolicy,
+    stale: &mut [bool],
+    slots: Range<usize>,
+) -> Changes {
+    let mut changes = Changes::default();
+    for slot in slots {
+        if !std::mem::replace(&mut stale[slot], false) {
+            continue;
+        }
+        let u = VertexId::from_index(slot);
+        let mut k = 0;
+        while let Some(&v) = mesh.ring(u).as_slice().get(k) {
+            k += 1;
+            if u < v && flip_if_wanted(mesh, bounds, [u, v], edits, stale) {
+                changes.inversions += 1;
+                k -= 1;
+            }
         }
     }
     changes
@@ -445,16 +583,18 @@ mod tests {
         let bounds = EdgeBounds { min: 0.01, max: 0.05 };
         let split = [RestructurePass::Collapse, RestructurePass::Split, RestructurePass::Flip];
         let mut mesh = before.clone();
-        run_passes(&mut mesh, bounds, &split, usize::MAX).unwrap();
+        let pauses = &Pauses::default();
+        finished(run_passes(&mut mesh, bounds, &split, usize::MAX, pauses)).unwrap();
         let needed = mesh.vertex_count();
         let mut mesh = before.clone();
-        let refused = run_passes(&mut mesh, bounds, &split, needed - 1);
+        let refused = finished(run_passes(&mut mesh, bounds, &split, needed - 1, pauses));
         assert_eq!(refused, Err(MeshError::TooManyVertices { vertices: needed as u64 }));
         assert!(mesh == before);
         // Those that add none, or no more than that, are not refused.
-        run_passes(&mut mesh, bounds, &split, needed).unwrap();
+        finished(run_passes(&mut mesh, bounds, &split, needed, pauses)).unwrap();
         assert_eq!(mesh.vertex_count(), needed);
         let mut mesh = before.clone();
-        run_passes(&mut mesh, bounds, &[RestructurePass::Collapse, RestructurePass::Flip], 1).unwrap();
+        let no_split = [RestructurePass::Collapse, RestructurePass::Flip];
+        finished(run_passes(&mut mesh, bounds, &no_split, 1, pauses)).unwrap();
     }
 }

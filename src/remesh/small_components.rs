@@ -4,6 +4,7 @@ use super::{Resolver, Sampling, TopologyGuide};
 use crate::math::triangle::solid_angle;
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId, sort_distinct};
+use crate::pauses::Pauses;
 
 /// The largest number of vertices of a small component. Larger ones are never removed: a volume below the thresholds
 /// alone does not show that a component is small, since the volume of a cavity is negative.
@@ -95,12 +96,15 @@ impl Resolver {
     /// without background always is), if none of its vertices could move, or if it is solid, more than half of them
     /// could not, and `guide` finds it empty. A component this small can also be inverted between two states without
     /// self-intersections, as when the apex of a tetrahedron passes through its base.
-    pub(super) fn remove_crushed(
+    ///
+    /// Pauses meanwhile.
+    pub(super) async fn remove_crushed(
         &mut self,
         mesh: &mut Mesh,
         sampling: Sampling,
         guide: &dyn TopologyGuide,
         stuck: &[VertexId],
+        pauses: &Pauses,
     ) {
         self.small.find(mesh);
         let is_stuck = |v: &VertexId| stuck.binary_search(v).is_ok();
@@ -109,6 +113,7 @@ impl Resolver {
             if !mesh.is_live(v) {
                 continue;
             }
+            pauses.after(1).await;
             let members = mesh.component_of(v, MAX_VERTICES + 1);
             let volume = volume(mesh, &members);
             let stuck = members.iter().filter(|v| is_stuck(v)).count();
@@ -123,18 +128,21 @@ impl Resolver {
 
     /// Updates the list of small components after the edits of a call of the resolver, and removes cavities smaller
     /// than the smallest sphere, except for those of at least δ³ in which `guide` finds background: an edit may have
-    /// inverted a solid, which would grow in empty space.
-    pub(super) fn update_small_components(
+    /// inverted a solid, which would grow in empty space. Pauses meanwhile.
+    pub(super) async fn update_small_components(
         &mut self,
         mesh: &mut Mesh,
         sampling: Sampling,
         guide: &dyn TopologyGuide,
+        pauses: &Pauses,
     ) {
         self.small.find_again(mesh, &self.edited);
+        pauses.now().await;
         for (v, is_solid) in std::mem::take(&mut self.small.components) {
             if !mesh.is_live(v) {
                 continue;
             }
+            pauses.after(1).await;
             let is_left = || {
                 let members = mesh.component_of(v, MAX_VERTICES);
                 let volume = volume(mesh, &members);
@@ -173,15 +181,17 @@ impl Resolver {
     }
 
     /// Removes all negligible components, of at most 32 vertices and less than δ³, except for cavities of at least δ³
-    /// in which `guide` finds background; returns the number of components removed.
-    pub fn remove_negligible(
+    /// in which `guide` finds background; returns the number of components removed. Pauses meanwhile.
+    pub async fn remove_negligible(
         &mut self,
         mesh: &mut Mesh,
         sampling: Sampling,
         guide: &dyn TopologyGuide,
+        pauses: &Pauses,
     ) -> u32 {
         let before = self.changes.vanished;
         for members in mesh.component_members() {
+            pauses.after(1).await;
             self.remove_if_negligible(mesh, sampling, guide, members[0]);
         }
         self.changes.vanished - before
@@ -241,6 +251,7 @@ fn volume(mesh: &Mesh, members: &[VertexId]) -> f32 {
 mod tests {
     use super::*;
     use crate::mesh::TriangleMesh;
+    use crate::pauses::finished;
     use crate::remesh::{Changes, Unguided};
     use std::f32::consts::TAU;
     #[cfg(target_arch = "wasm32")]
@@ -388,9 +399,10 @@ mod tests {
     fn removed_components_are_not_visited_again() {
         let (mut both, hollow) = nested();
         let mut resolver = Resolver::with_max_vertices(1000);
-        resolver.remove_crushed(&mut both, Sampling::new(0.2), &Unguided, &hollow);
+        let (sampling, pauses) = (Sampling::new(0.2), Pauses::default());
+        finished(resolver.remove_crushed(&mut both, sampling, &Unguided, &hollow, &pauses));
         assert_eq!(both.vertex_count(), 12);
-        resolver.update_small_components(&mut both, Sampling::new(0.2), &Unguided);
+        finished(resolver.update_small_components(&mut both, sampling, &Unguided, &pauses));
         assert_eq!(both.vertex_count(), 12);
     }
 

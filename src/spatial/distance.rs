@@ -4,6 +4,13 @@ use super::TriangleTree;
 use crate::math::order::{rank_f64, sort_by_rank};
 use crate::math::triangle;
 use crate::mesh::{MeshError, TriangleMesh};
+use crate::pauses::{Pauses, finished};
+
+/// The number of vertices between two counts of the work: one may visit every triangle.
+const CHUNK: usize = 8;
+
+/// The number of triangles visited that are a unit of work.
+const TESTS_PER_UNIT: usize = 16;
 
 /// Distances between two surfaces, in the length unit of the meshes. All except `per_vertex` are the same, bit for bit,
 /// if the surfaces are exchanged.
@@ -37,6 +44,18 @@ pub struct SurfaceDistance {
 /// [`MeshError::InvalidArgument`] if either (parameter `mesh` is the first, `other` the second) has no triangle, or if
 /// [`TriangleMesh::validate`] fails for it.
 pub fn surface_distance(mesh: &TriangleMesh, other: &TriangleMesh) -> Result<SurfaceDistance, MeshError> {
+    finished(surface_distance_in_slices(mesh, other, &Pauses::default()))
+}
+
+/// Does what [`surface_distance`] does, and pauses meanwhile.
+///
+/// # Errors
+/// As [`surface_distance`].
+pub async fn surface_distance_in_slices(
+    mesh: &TriangleMesh,
+    other: &TriangleMesh,
+    pauses: &Pauses,
+) -> Result<SurfaceDistance, MeshError> {
     not_empty("mesh", mesh)?;
     not_empty("other", other)?;
     // Compared relative to the origin that is further away: only coarse positions are exact relative to the other.
@@ -45,8 +64,9 @@ pub fn surface_distance(mesh: &TriangleMesh, other: &TriangleMesh) -> Result<Sur
     let [moved, other_moved] =
         [mesh, other].map(|one| (one.origin != origin).then(|| one.relative_to(origin)));
     let (mesh, other) = (moved.as_ref().unwrap_or(mesh), other_moved.as_ref().unwrap_or(other));
-    let per_vertex = one_way(mesh, &TriangleTree::new(other)?);
-    let back = one_way(other, &TriangleTree::new(mesh)?);
+    pauses.now().await;
+    let per_vertex = one_way(mesh, TriangleTree::in_slices(other, pauses).await?, pauses).await;
+    let back = one_way(other, TriangleTree::in_slices(mesh, pauses).await?, pauses).await;
     let [there, back] = [Summary::of(mesh, &per_vertex), Summary::of(other, &back)];
     Ok(SurfaceDistance {
         per_vertex,
@@ -64,10 +84,17 @@ fn not_empty(parameter: &'static str, mesh: &TriangleMesh) -> Result<(), MeshErr
     Err(MeshError::InvalidArgument { parameter, problem: "the mesh has no triangles".into() })
 }
 
-fn one_way(mesh: &TriangleMesh, surface: &TriangleTree) -> Vec<f64> {
-    // There is a closest point unless `p` is not finite; such a mesh is rejected when its own tree is built.
-    let distance = |p| surface.closest(p).map_or(0.0, |nearest| nearest.distance);
-    mesh.positions.iter().map(|&p| distance(p)).collect()
+async fn one_way(mesh: &TriangleMesh, surface: TriangleTree, pauses: &Pauses) -> Vec<f64> {
+    pauses.now().await;
+    let mut distances = Vec::with_capacity(mesh.positions.len());
+    for some in mesh.positions.chunks(CHUNK) {
+        let mut tests = 0;
+        // There is a closest point unless `p` is not finite; such a mesh is rejected when its own tree is built.
+        let distance = |&p| surface.closest_counting(p, &mut tests).map_or(0.0, |nearest| nearest.distance);
+        distances.extend(some.iter().map(distance));
+        pauses.after(tests / TESTS_PER_UNIT).await;
+    }
+    distances
 }
 
 /// Statistics of the distances of a mesh's vertices from another surface, weighted by area.

@@ -18,7 +18,7 @@ mod vertex_grid;
 pub use cavities::outer_components;
 pub use cells::CellSet;
 pub use contains::contains;
-pub use distance::{SurfaceDistance, surface_distance};
+pub use distance::{SurfaceDistance, surface_distance, surface_distance_in_slices};
 pub use lattice_distance::lattice_distances;
 pub use points::PointGrid;
 pub use section::cross_section;

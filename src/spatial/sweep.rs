@@ -9,6 +9,8 @@
 use super::vertex_grid::{Proximity, VertexBall};
 use crate::math::make_room;
 use crate::math::order::{combined_rank, median, rank_f32, sort_by_rank, sort_ranks};
+use crate::pauses::Pauses;
+use std::cell::Cell;
 
 /// The radius bound of the first size class of balls, as a multiple of the median radius. If smaller, the few long
 /// edges of an ordinary mesh need a class of their own; if larger, they make all columns of the first class wide.
@@ -37,9 +39,20 @@ const MAX_COLUMNS_PER_BALL: usize = 8;
 /// needlessly.
 const FILTER_BITS: usize = 8;
 
+/// The number of pairs of balls whose tests are a unit of work.
+const TESTS_PER_UNIT: usize = 256;
+
+/// The number of tests after which a sweep counts its work: columns have few.
+const TESTS: usize = 16 * TESTS_PER_UNIT;
+
 /// Calls `found` once with every pair of `balls` whose centres are no farther apart than [`Proximity::distance_for`]
-/// returns for their radii. The order is unspecified but deterministic.
-pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut(&VertexBall, &VertexBall)) {
+/// returns for their radii, and pauses meanwhile. The order is unspecified but deterministic.
+pub async fn near_pairs(
+    balls: Vec<VertexBall>,
+    near: Proximity,
+    mut found: impl FnMut(&VertexBall, &VertexBall),
+    pauses: &Pauses,
+) {
     let mut bound = FIRST_CLASS_BOUND * median_radius(&balls);
     let (mut smaller, mut left) = (Vec::new(), balls);
     while !left.is_empty() {
@@ -53,7 +66,7 @@ pub fn near_pairs(balls: Vec<VertexBall>, near: Proximity, mut found: impl FnMut
         // Longest edges are infinite if their squares overflow.
         bound = if bound < f32::MAX / FACTOR { bound * FACTOR } else { f32::INFINITY };
         if !class.is_empty() {
-            let class = sweep_class(class, &smaller, near, &mut found);
+            let class = sweep_class(class, &smaller, near, &mut found, pauses).await;
             if smaller.is_empty() {
                 smaller = class;
             } else if !left.is_empty() {
@@ -76,29 +89,49 @@ fn median_radius(balls: &[VertexBall]) -> f32 {
 /// Calls `found` with the pairs of balls that are no farther apart than `near` allows: those within the size class
 /// `class`, and those of one ball of `class` and one of `smaller`, the balls of smaller classes. Returns the balls of
 /// `class`, in another order.
-fn sweep_class(
+async fn sweep_class(
     class: Vec<VertexBall>,
     smaller: &[VertexBall],
     near: Proximity,
     found: &mut impl FnMut(&VertexBall, &VertexBall),
+    pauses: &Pauses,
 ) -> Vec<VertexBall> {
     let largest = class.iter().fold(0.0, |most, ball| if ball.radius > most { ball.radius } else { most });
     let reach = near.distance_for(largest, largest);
     let width = Width(1.0 / (COLUMN_MARGIN * f64::from(reach)));
+    let tests = Cell::new(0);
     let mut test = |a: &VertexBall, b: &VertexBall| {
+        tests.set(tests.get() + 1);
         let reach = near.distance_for(a.radius, b.radius);
         if a.position.distance_squared(b.position) <= reach * reach {
             found(a, b);
         }
     };
     let large = Columns::new(width, class);
-    large.pairs(reach, &mut test);
+    pauses.now().await;
+    let mut row = 0;
+    for k in 0..large.count() {
+        large.pairs_at(k, &mut row, reach, &mut test);
+        count(&tests, pauses).await;
+    }
     if !smaller.is_empty() {
         let filter = Filter::around(&large);
         let around = smaller.iter().filter(|ball| filter.may_contain(width.column(ball))).copied();
-        large.pairs_with(&Columns::new(width, around.collect()), reach, &mut test);
+        let around = Columns::new(width, around.collect());
+        let mut rows = [0; 3];
+        for k in 0..large.count() {
+            large.pairs_at_with(k, &around, &mut rows, reach, &mut test);
+            count(&tests, pauses).await;
+        }
     }
     large.balls
+}
+
+/// Counts tests as work once there are many.
+async fn count(tests: &Cell<usize>, pauses: &Pauses) {
+    if tests.get() >= TESTS {
+        pauses.after(tests.replace(0) / TESTS_PER_UNIT).await;
+    }
 }
 
 /// The width of the columns into which the xy-plane is divided, stored as its inverse.
@@ -221,32 +254,40 @@ impl Columns {
         &self.balls[self.columns[k].1..self.columns[k + 1].1]
     }
 
-    /// Calls `test` with the pairs of balls in the same or adjacent columns whose heights differ by at most `reach`.
-    fn pairs(&self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
-        let mut row = 0;
-        for k in 0..self.count() {
-            let [x, y] = self.column(k);
-            let own = self.balls(k);
-            for (i, a) in own.iter().enumerate() {
-                let top = a.position.z + reach;
-                own[i + 1..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
-            }
-            if self.column(k + 1) == [x, y + 1] {
-                visit_column_pairs(own, self.balls(k + 1), reach, test);
-            }
-            self.visit_row_pairs(own, [x + 1, y], &mut row, reach, test);
+    /// Calls `test` with the pairs of a ball in column `k` and one in it or in an adjacent column after it, whose heights
+    /// differ by at most `reach`. To be called for all columns in order, with the same `row`, which is 0 at first.
+    fn pairs_at(
+        &self,
+        k: usize,
+        row: &mut usize,
+        reach: f32,
+        test: &mut impl FnMut(&VertexBall, &VertexBall),
+    ) {
+        let [x, y] = self.column(k);
+        let own = self.balls(k);
+        for (i, a) in own.iter().enumerate() {
+            let top = a.position.z + reach;
+            own[i + 1..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
         }
+        if self.column(k + 1) == [x, y + 1] {
+            visit_column_pairs(own, self.balls(k + 1), reach, test);
+        }
+        self.visit_row_pairs(own, [x + 1, y], row, reach, test);
     }
 
-    /// Calls `test` with the pairs of one ball of `self` and one of `other` in the same or adjacent columns whose
-    /// heights differ by at most `reach`.
-    fn pairs_with(&self, other: &Self, reach: f32, test: &mut impl FnMut(&VertexBall, &VertexBall)) {
-        let mut rows = [0; 3];
-        for k in 0..self.count() {
-            let [x, y] = self.column(k);
-            for (row, x) in rows.iter_mut().zip(x - 1..=x + 1) {
-                other.visit_row_pairs(self.balls(k), [x, y], row, reach, test);
-            }
+    /// Calls `test` with the pairs of a ball in column `k` and one of `other` in the same or an adjacent column, whose
+    /// heights differ by at most `reach`. To be called for all columns in order, with the same `rows`, which are 0 at first.
+    fn pairs_at_with(
+        &self,
+        k: usize,
+        other: &Self,
+        rows: &mut [usize; 3],
+        reach: f32,
+        test: &mut impl FnMut(&VertexBall, &VertexBall),
+    ) {
+        let [x, y] = self.column(k);
+        for (row, x) in rows.iter_mut().zip(x - 1..=x + 1) {
+            other.visit_row_pairs(self.balls(k), [x, y], row, reach, test);
         }
     }
 
@@ -331,6 +372,7 @@ mod tests {
     use super::*;
     use crate::math::{Random, Vec3};
     use crate::mesh::VertexId;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -367,9 +409,10 @@ mod tests {
                 share: 0.8,
             };
             let mut found = Vec::new();
-            near_pairs(balls.clone(), near, |a, b| {
+            let pair = |a: &VertexBall, b: &VertexBall| {
                 found.push([a.vertex.min(b.vertex).0, a.vertex.max(b.vertex).0]);
-            });
+            };
+            finished(near_pairs(balls.clone(), near, pair, &Pauses::default()));
             found.sort_unstable();
             let is_near = |a: &VertexBall, b: &VertexBall| {
                 let reach = near.distance_for(a.radius, b.radius);

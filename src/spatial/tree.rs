@@ -1,8 +1,12 @@
 //! A bounding volume hierarchy of triangles, for closest-point, ray and overlap queries.
 
 use crate::math::triangle::{self, Line, LineHit};
-use crate::math::{Bounds, BoxTree, DVec3, Ray, Vec3};
+use crate::math::{Bounds, BoxTree, BoxTreeBuilder, DVec3, Ray, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
+use crate::pauses::{Pauses, finished};
+
+/// The number of triangles of a subtree whose node is a unit of work to build.
+const TRIANGLES_PER_UNIT: usize = 32;
 
 /// A bounding volume hierarchy of the triangles of a static mesh, for closest-point, ray and overlap queries.
 #[derive(Clone, Debug)]
@@ -33,10 +37,29 @@ impl TriangleTree {
     /// As [`TriangleMesh::validate`], for example [`MeshError::InvalidArgument`] for an invalid index or a position
     /// that is not finite.
     pub fn new(mesh: &TriangleMesh) -> Result<Self, MeshError> {
+        finished(Self::in_slices(mesh, &Pauses::default()))
+    }
+
+    /// Creates the tree as [`Self::new`] does, and pauses meanwhile.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub async fn in_slices(mesh: &TriangleMesh, pauses: &Pauses) -> Result<Self, MeshError> {
         mesh.validate()?;
         let corners: Vec<_> = mesh.corners().collect();
         let bounds: Vec<_> = corners.iter().map(|c| Bounds::from_points(c)).collect();
-        Ok(Self { boxes: BoxTree::new(&bounds), corners })
+        let mut builder = BoxTreeBuilder::new(&bounds);
+        drop(bounds);
+        let mut built = 0;
+        while let Some(triangles) = builder.advance() {
+            built += triangles;
+            // Small subtrees are counted together.
+            if built >= TRIANGLES_PER_UNIT {
+                pauses.after(built / TRIANGLES_PER_UNIT).await;
+                built = 0;
+            }
+        }
+        Ok(Self { boxes: builder.finish(), corners })
     }
 
     /// Creates a tree without triangles, in which queries find nothing.
@@ -46,11 +69,17 @@ impl TriangleTree {
 
     /// Returns the closest point of the surface to `p`; `None` if there are no triangles or `p` is not finite.
     pub fn closest(&self, p: Vec3) -> Option<SurfacePoint> {
+        self.closest_counting(p, &mut 0)
+    }
+
+    /// Returns what [`Self::closest`] returns, and adds the number of triangles visited to `tests`.
+    pub(super) fn closest_counting(&self, p: Vec3, tests: &mut usize) -> Option<SurfacePoint> {
         if !p.is_finite() {
             return None;
         }
         let mut best: Option<(f64, u32, DVec3)> = None;
         self.boxes.nearest(p, |item, bound| {
+            *tests += 1;
             let corners = self.corners[item as usize];
             let barycentric = triangle::closest_barycentric(corners, p);
             let distance = triangle::point_at(corners, barycentric).distance_squared(p.as_dvec3());

@@ -12,7 +12,7 @@ const ALLOWED: [(&str, &[&str]); 10] = [
     ("pauses", &[]),
     ("math", &[]),
     ("mesh", &["math"]),
-    ("spatial", &["math", "mesh"]),
+    ("spatial", &["math", "mesh", "pauses"]),
     ("volume", &["math", "mesh", "warning"]),
     ("io", &["math", "mesh", "volume", "warning"]),
     ("voxelise", &["math", "mesh", "spatial", "volume"]),

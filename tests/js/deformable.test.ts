@@ -10,7 +10,7 @@ import {
   VesicleError,
   Volume,
 } from '../../pkg/index.js';
-import { ball, ballWithHollowAndPlate, failure, noise, PAPER, rejection, wrong } from './helpers.js';
+import { ball, ballWithHollowAndPlate, failure, HEALTHY, noise, PAPER, rejection, wrong } from './helpers.js';
 import { SPONGE_BITS, spongeBits } from './sponge.js';
 
 type Options = ConstructorParameters<typeof DeformableModel>[0];
@@ -595,4 +595,49 @@ test('a model can be created in slices, with the same bits, and not if that is a
   await expect(DeformableModel.create({ volume }, options)).rejects.toThrow('enough');
   const error = await rejection(DeformableModel.create({ volume, edge: -1 }));
   expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining('edge')]);
+});
+
+test('a run yields within steps: an abort leaves the model as after the last step', async () => {
+  const make = () => new DeformableModel({ volume: noise(14, 8), params: { smallestPart: 0, seeding: 'on' } });
+  const [whole, sliced] = [make(), make()];
+  const expectSame = () => expect(Buffer.from(sliced.save()).equals(Buffer.from(whole.save()))).toBe(true);
+  let withinSteps = 0;
+  for (let round = 1; round <= 6; round++) {
+    const stop = new AbortController();
+    const ended: number[] = [];
+    const onStep = ({ iteration }: StepReport) => ended.push(iteration);
+    const run = sliced.run({ signal: stop.signal, budgetMs: 1e-6, onStep });
+    // After another number of slices each time.
+    for (let slice = 0; slice < 4 * round; slice++) await new Promise((resolve) => setImmediate(resolve));
+    stop.abort('enough');
+    await expect(run).rejects.toBe('enough');
+    if (ended.length === 0) withinSteps += 1;
+    else whole.step(ended.length);
+    expectSame();
+    expect(sliced.mesh.check()).toEqual(HEALTHY);
+    const { times: _, ...report } = await sliced.run({ maxIterations: 1, budgetMs: 1e-6 });
+    const { times: __, ...expected } = whole.step();
+    expect(report).toEqual(expected);
+    expectSame();
+  }
+  expect(withinSteps).toBeGreaterThan(2);
+});
+
+test('what is asked of a model in the middle of a step ends the step first', async () => {
+  const make = () => new DeformableModel({ volume: noise(14, 8), params: { smallestPart: 0 } });
+  const [whole, sliced] = [make(), make()];
+  const reports: number[] = [];
+  const run = sliced.run({ maxIterations: 3, budgetMs: 1e-6, onStep: ({ iteration }) => reports.push(iteration) });
+  await new Promise((resolve) => setImmediate(resolve));
+  whole.step();
+  expect(sliced.mesh.arrays()).toEqual(whole.mesh.arrays());
+  for (const one of [whole, sliced]) one.setParams({ rigidity: 0.3 });
+  await run;
+  whole.step(2);
+  expect(reports).toEqual([1, 2, 3]);
+  expect(Buffer.from(sliced.save()).equals(Buffer.from(whole.save()))).toBe(true);
+  const freed = sliced.run({ budgetMs: 1e-6 });
+  await new Promise((resolve) => setImmediate(resolve));
+  sliced.free();
+  expect((await rejection(freed)).code).toBe('freed');
 });

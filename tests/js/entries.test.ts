@@ -17,7 +17,17 @@ const LABEL_MAPS = ['crop', 'dice', 'frame', 'label', 'labels', 'resample', 'thr
 
 /** Members of meshes that only the whole library has. */
 const VOXELISATION = [
-  ...['contains', 'cut', 'decimateWithin', 'keepComponents', 'removeCavities', 'smooth', 'toVolume', 'transform'],
+  ...[
+    'contains',
+    'cut',
+    'decimateWithin',
+    'inSlices',
+    'keepComponents',
+    'removeCavities',
+    'smooth',
+    'toVolume',
+    'transform',
+  ],
 ];
 
 type VolumeInit = ConstructorParameters<typeof vesicle.Volume>[0];

@@ -224,3 +224,44 @@ test('parameters describe themselves', () => {
 test('the same bits as on every other platform', () => {
   expect(lampBits(vesicle)).toBe(LAMP_BITS);
 });
+
+test('a model can be created in slices, with the same bits, and not if that is aborted', async () => {
+  const given: Options[] = [
+    { detail: wavy() },
+    { detail: wavy(), support: 'membrane', ellipsoids: [ball(0, 0.9)], params: EDGES },
+    { detail: wavy(), base: Mesh.icosphere([0, 0, 0], 1, 0.2), ellipsoids: [ball(0, 0.9)], params: EDGES },
+    { ellipsoids: [ball(-0.5, 1), ball(0.5, 0.8)], params: EDGES },
+  ];
+  for (const options of given) {
+    const whole = model({ ellipsoids: [], params: {}, ...options });
+    let turns = 0;
+    const count = () => {
+      turns += 1;
+      immediate = setImmediate(count);
+    };
+    let immediate = setImmediate(count);
+    const sliced = await MultiresolutionModel.create({ ellipsoids: [], ...options }, { budgetMs: 1e-6 });
+    clearImmediate(immediate);
+    models.push(sliced);
+    expect(sliced).toBeInstanceOf(MultiresolutionModel);
+    expect(sliced.mesh.arrays()).toEqual(whole.mesh.arrays());
+    expect(Buffer.from(sliced.save()).equals(Buffer.from(whole.save()))).toBe(true);
+    expect(turns).toBeGreaterThan(2);
+    const stop = new AbortController();
+    const aborted = MultiresolutionModel.create(options, { signal: stop.signal, budgetMs: 1e-6 });
+    setImmediate(() => stop.abort(new Error('enough')));
+    await expect(aborted).rejects.toThrow('enough');
+    await expect(MultiresolutionModel.create(options, { signal: stop.signal })).rejects.toThrow('enough');
+  }
+  const error = await rejection(MultiresolutionModel.create({ ellipsoids: [], params: EDGES }));
+  expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining('ellipsoid')]);
+});
+
+test('the meshes of a model that is created in slices may be freed meanwhile', async () => {
+  const detail = wavy();
+  const created = MultiresolutionModel.create({ detail }, { budgetMs: 1e-6 });
+  detail.free();
+  const made = await created;
+  models.push(made);
+  expect(made.mesh.arrays().positions).toEqual(wavy().arrays().positions);
+});

@@ -83,7 +83,7 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     const parsed = await Mesh.parse(await textured.toBytes('ply'));
     const found = await Mesh.marchingCubes(new Volume({ data, dims: DIMS }), 100);
     await found.remesh({ min: 0.5, max: 1.5 });
-    await found.decimate(300);
+    await found.inSlices().decimate(300);
     const copy = await found.clone();
     await copy.refine();
     const moved = await copy.restructure({ min: 0.6, max: 2 }, ['flip']);
@@ -104,7 +104,7 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
       [moved, await copy.check(), await copy.curvature('mean'), await copy.geodesic(0)],
       await Promise.all([found.vertexCount, found.triangleCount, found.topologyVersion, found.geometryVersion]),
       await Promise.all([ball.texture, ball.pick([3, 0.1, 0], [-1, 0, 0]), ball.pick([3, 0, 0], [1, 0, 0])]),
-      await Promise.all([ball.distanceTo(parsed), ball.crossSection([0, 0, 0.1], [0, 0, 1])]),
+      await Promise.all([ball.inSlices().distanceTo(parsed), ball.crossSection([0, 0, 0.1], [0, 0, 1])]),
       await Promise.all([smoothed.arrays(), distances.intensities(), smoothed.contains(positions)]),
     ];
   },
@@ -354,6 +354,33 @@ test('during a run parameters can change, and other calls are refused', async ()
   expect((await rejection(model.run({ signal: wrong('now') }))).message).toContain('AbortSignal');
   abort.abort('done');
   await expect(run).rejects.toBe('done');
+});
+
+test('operations of meshes in slices are aborted, and refuse other changes meanwhile', async () => {
+  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 0.03);
+  const before = await mesh.arrays();
+  const abort = new AbortController();
+  const slices = mesh.inSlices({ signal: abort.signal, budgetMs: 1e-6 });
+  const work = slices.decimate(1000);
+  expect((await rejection(mesh.refine())).message).toContain('refine: not allowed while this mesh is changed');
+  expect((await rejection(slices.remesh({ min: 1, max: 1 }))).message).toContain('edge.max');
+  expect(() => mesh.inSlices(wrong({ budgetMs: 0 }))).toThrow('budgetMs');
+  abort.abort('enough');
+  await expect(work).rejects.toBe('enough');
+  await expect(slices.decimate(1000)).rejects.toBe('enough');
+  expect(await mesh.arrays()).toEqual(before);
+  await mesh.inSlices().decimate(1000);
+  expect(await mesh.triangleCount).toBeLessThanOrEqual(1000);
+});
+
+test('a multiresolution model is created in slices, and the creation is aborted', async () => {
+  const detail = await worker.Mesh.icosphere([0, 0, 0], 1, 0.05);
+  const stop = new AbortController();
+  const work = worker.MultiresolutionModel.create({ detail }, { signal: stop.signal, budgetMs: 1e-6 });
+  stop.abort('enough');
+  await expect(work).rejects.toBe('enough');
+  const model = await worker.MultiresolutionModel.create({ detail });
+  expect(await model.mesh.vertexCount).toBe(await detail.vertexCount);
 });
 
 test('arrays are copied, or transferred on request', async () => {

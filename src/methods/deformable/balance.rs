@@ -10,6 +10,7 @@ use super::contour::{ObjectIs, contour_of_grid, placed};
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{TriangleMesh, VertexId, measure, sort_distinct};
 use crate::methods::MethodError;
+use crate::pauses::Pauses;
 use crate::volume::{Region, Subdivided};
 
 /// The least share of its volume that a component lacks, or has in excess, at which it is moved. The contour itself lacks
@@ -39,13 +40,14 @@ impl DeformableModel {
     ///
     /// # Errors
     /// If memory does not suffice for the contour of a component.
-    pub(super) fn balance_volumes(&mut self) -> Result<(), MethodError> {
+    pub(super) async fn balance_volumes(&mut self, pauses: &Pauses) -> Result<(), MethodError> {
         if !self.params.adapts_to_image() || self.pyramid.is_sparse() {
             return Ok(());
         }
         let mut displacements = vec![Vec3::ZERO; self.mesh.slots()];
         let mut moving: Vec<VertexId> = Vec::new();
         for component in self.mesh.component_members() {
+            pauses.after(1 + component.len()).await;
             let distance = self.distance_to_volume(&component)?;
             if distance == 0.0 {
                 continue;
@@ -58,7 +60,8 @@ impl DeformableModel {
         if !moving.is_empty() {
             sort_distinct(&mut moving);
             let sampling = self.sampling();
-            self.resolver.move_some(&mut self.mesh, sampling, &moving, &mut displacements);
+            let Self { mesh, resolver, .. } = self;
+            resolver.move_some_in_slices(mesh, sampling, &moving, &mut displacements, pauses).await;
         }
         Ok(())
     }

@@ -5,6 +5,7 @@ use super::image::LevelImage;
 use super::params::{DeformableParams, Integrator, RestLength};
 use crate::math::{Mat3, Vec3, resize};
 use crate::mesh::{Ring, VertexId};
+use crate::pauses::Pauses;
 use crate::volume::{CellCache, Padding};
 
 /// The speed along the normal, in δ per unit of time, above which the tangential parts of rigidity and of the
@@ -89,6 +90,12 @@ impl ForceScale {
     }
 }
 
+/// The number of vertices whose forces are evaluated between two counts of the work.
+const CHUNK: usize = 256;
+
+/// The number of vertices whose forces are a unit of work.
+const VERTICES_PER_UNIT: usize = 4;
+
 /// The image and the attractors that exert external forces, with the parameters of all forces.
 pub(super) struct Field<'a> {
     pub(super) image: &'a LevelImage,
@@ -155,20 +162,34 @@ impl Forces {
     }
 
     /// Computes the forces on `vertices` and stores them in [`Self::force`]; needs [`Self::update_normals`] of them and
-    /// their neighbours at the same positions.
-    pub(super) fn evaluate(
+    /// their neighbours at the same positions. Pauses meanwhile.
+    pub(super) async fn evaluate(
         &mut self,
         rings: &[Ring],
-        positions: &[Vec3],
-        velocities: &[Vec3],
-        field: &Field,
+        [positions, velocities]: [&[Vec3]; 2],
+        field: &Field<'_>,
         vertices: &[VertexId],
+        pauses: &Pauses,
     ) {
-        let &Field { image, ref scale, attractors } = field;
-        let rest = rest_length(rings, positions, scale);
-        if image.bricks().is_none() {
+        let rest = rest_length(rings, positions, &field.scale);
+        if field.image.bricks().is_none() {
             resize(&mut self.cells, rings.len(), CellCache::default());
         }
+        for some in vertices.chunks(CHUNK) {
+            self.evaluate_some(rings, [positions, velocities], field, some, rest);
+            pauses.after(some.len() / VERTICES_PER_UNIT).await;
+        }
+    }
+
+    fn evaluate_some(
+        &mut self,
+        rings: &[Ring],
+        [positions, velocities]: [&[Vec3]; 2],
+        field: &Field,
+        vertices: &[VertexId],
+        rest: f32,
+    ) {
+        let &Field { image, ref scale, attractors } = field;
         for v in vertices.iter().map(|v| v.index()) {
             let ring = &rings[v];
             let x = positions[v];

@@ -57,6 +57,7 @@
 
 mod awake;
 mod balance;
+mod checkpoint;
 mod coarse;
 mod contour;
 mod coverage;
@@ -89,6 +90,7 @@ use crate::mesh::{Mesh, ScalarKey, TriangleMesh, VectorKey, VertexId, grid_origi
 use crate::pauses::{Pauses, finished};
 use crate::remesh::{Changes, Resolver, Sampling};
 use crate::volume::Volume;
+use checkpoint::{Checkpoint, Progress};
 use domain::Domain;
 use forces::{Field, ForceScale, LocalAttractor};
 use image::Pyramid;
@@ -250,6 +252,8 @@ pub struct DeformableModel {
     components: u32,
     /// The numbers of edits made by [`Self::refresh`] since the last step, which the next one reports.
     refreshed: Changes,
+    /// The state some steps ago, from which a step that is given up is undone.
+    checkpoint: Option<Box<Checkpoint>>,
     clock: fn() -> f64,
 }
 
@@ -363,6 +367,7 @@ impl DeformableModel {
             speed: SpeedSummary::default(),
             components: 0,
             refreshed: Changes::default(),
+            checkpoint: None,
             clock: || 0.0,
         };
         model.begin_on(begins_on_contour, pauses).await?;
@@ -397,25 +402,34 @@ impl DeformableModel {
     /// option `edge` is too long for the object. [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not
     /// suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
-        if self.pyramid.is_sparse() { self.step_if_loaded() } else { self.iterate(None) }
+        self.checkpoint = None;
+        if self.pyramid.is_sparse() {
+            self.step_if_loaded()
+        } else {
+            finished(self.iterate(None, &Pauses::default()))
+        }
     }
 
-    /// Makes one iteration; on a sparse volume `before` is completed, by which it can be undone.
-    fn iterate(&mut self, before: Option<&mut Before>) -> Result<StepReport, MethodError> {
+    /// Makes one iteration, with pauses meanwhile; on a sparse volume `before` is completed, by which it can be undone.
+    async fn iterate(
+        &mut self,
+        before: Option<&mut Before>,
+        pauses: &Pauses,
+    ) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = std::mem::take(&mut self.refreshed);
         if !self.is_done() {
             let mut before = before.filter(|_| self.pyramid.is_sparse());
-            self.move_vertices(before.as_deref_mut(), &mut times);
+            self.move_vertices(before.as_deref_mut(), &mut times, pauses).await;
             if let Some(before) = before {
                 self.prepare_edits(before)?;
             }
             if self.params.topology == Topology::Adaptive {
                 let active = self.vertices_to_check();
-                changes += self.restore_bounds(&active, &mut times);
+                changes += self.restore_bounds(&active, &mut times, pauses).await;
             }
             self.iteration += 1;
-            changes += self.update_convergence(&mut times)?;
+            changes += self.update_convergence(&mut times, pauses).await?;
             self.count_components(changes);
             if let Some(most) = self.resolver.take_overflow() {
                 return Err(MethodError::TooManyVertices { most });
@@ -424,7 +438,7 @@ impl DeformableModel {
         Ok(self.report(changes, times))
     }
 
-    fn move_vertices(&mut self, before: Option<&mut Before>, times: &mut Times) {
+    async fn move_vertices(&mut self, before: Option<&mut Before>, times: &mut Times, pauses: &Pauses) {
         let begin = (self.clock)();
         if self.pyramid.is_sparse() && std::mem::take(&mut self.needs_factor) {
             self.image_force_factor = self.measured_factor();
@@ -457,13 +471,14 @@ impl DeformableModel {
             clock: self.clock,
         };
         let (clock, mut embedding) = (self.clock, 0.0);
-        let displace = |mesh: &mut Mesh, moving: &[VertexId], displacements: &mut [Vec3]| {
+        let (resolver, sampling) = (&mut self.resolver, Sampling::new(delta));
+        let displace = async |mesh: &mut Mesh, moving: &[VertexId], displacements: &mut [Vec3]| {
             let begin = clock();
-            let held = self.resolver.move_some(mesh, Sampling::new(delta), moving, displacements);
+            let held = resolver.move_some_in_slices(mesh, sampling, moving, displacements, pauses).await;
             embedding = clock() - begin;
             held
         };
-        self.speed = self.motion.advance(&mut self.mesh, self.keys, &context, displace);
+        self.speed = self.motion.advance(&mut self.mesh, self.keys, &context, displace, pauses).await;
         let forces = std::mem::take(&mut self.motion.forces.milliseconds);
         times.add("normals", normals - begin);
         times.add("forces", forces);
@@ -490,14 +505,14 @@ impl DeformableModel {
 
     /// Restores edge bounds and resolves contacts around the vertices `active`, wakes the edited vertices and their
     /// neighbours, and renumbers the mesh if too few of its slots are live. Returns the numbers of edits.
-    fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times) -> Changes {
+    async fn restore_bounds(&mut self, active: &[VertexId], times: &mut Times, pauses: &Pauses) -> Changes {
         let begin = (self.clock)();
         let sampling = self.sampling();
         let changes = {
             let image = &self.pyramid.levels[self.level];
             let guide =
                 image_guide::guide_within(image, self.level_iso, &self.params, self.followed_bounds());
-            self.resolver.resolve_guided(&mut self.mesh, sampling, active, &*guide)
+            self.resolver.resolve_in_slices(&mut self.mesh, sampling, active, &*guide, pauses).await
         };
         let since_edit = self.mesh.scalar_mut(self.keys.since_edit);
         self.resolver.edited().iter().for_each(|v| since_edit[v.index()] = 0.0);
@@ -584,6 +599,7 @@ impl DeformableModel {
     /// [`MethodError::InvalidArgument`] for values out of range, [`MethodError::Volume`] if the gradient image does not
     /// fit into memory, those of [`Self::new`] if the run begins again; nothing is changed then.
     pub fn set_params(&mut self, params: DeformableParams) -> Result<(), MethodError> {
+        self.checkpoint = None;
         self.check_params(&params)?;
         if self.jumps_with(&params) {
             return self.begin_again(params);
@@ -617,6 +633,7 @@ impl DeformableModel {
     /// # Errors
     /// [`MethodError::InvalidArgument`] if a number is not finite or too large, or a radius is not positive.
     pub fn set_attractors(&mut self, attractors: Vec<Attractor>) -> Result<(), MethodError> {
+        self.checkpoint = None;
         self.check_attractors(&attractors)?;
         self.attractors = attractors;
         self.wake_all();

@@ -7,6 +7,7 @@ use super::forces::{Field, Forces};
 use super::params::{DeformableParams, Integrator};
 use crate::math::{Bounds, Vec3, higher, resize};
 use crate::mesh::{Mesh, VertexId};
+use crate::pauses::Pauses;
 
 /// The speed of the mesh in one iteration, by which convergence is judged.
 #[derive(Clone, Copy, Debug, Default)]
@@ -92,17 +93,19 @@ impl Motion {
     ///
     /// `displace` moves vertices by displacements, given by slot, and replaces these by the ones applied. It returns
     /// the vertices held back, each with the share, from 0 to 1, of its displacement that it moved by.
-    pub(super) fn advance(
+    /// Pauses meanwhile.
+    pub(super) async fn advance(
         &mut self,
         mesh: &mut Mesh,
         keys: Keys,
-        context: &MotionContext,
-        displace: impl FnOnce(&mut Mesh, &[VertexId], &mut [Vec3]) -> Vec<(VertexId, f32)>,
+        context: &MotionContext<'_>,
+        displace: impl AsyncFnOnce(&mut Mesh, &[VertexId], &mut [Vec3]) -> Vec<(VertexId, f32)>,
+        pauses: &Pauses,
     ) -> SpeedSummary {
         match context.params.integrator {
-            Integrator::Euler => self.euler(mesh, keys, context),
-            Integrator::RungeKutta => self.runge_kutta(mesh, keys, context),
-            Integrator::Implicit => self.implicit(mesh, keys, context),
+            Integrator::Euler => self.euler(mesh, keys, context, pauses).await,
+            Integrator::RungeKutta => self.runge_kutta(mesh, keys, context, pauses).await,
+            Integrator::Implicit => self.implicit(mesh, keys, context, pauses).await,
         }
         if context.examine_all {
             self.wake_unsettled(mesh, keys, context);
@@ -112,7 +115,7 @@ impl Motion {
             self.forces.keep_normals();
             self.awake.keep_moving();
         }
-        let held = displace(mesh, &self.awake.moving, &mut self.displacements);
+        let held = displace(mesh, &self.awake.moving, &mut self.displacements).await;
         let velocities = mesh.vector_mut(keys.velocity);
         held.iter().for_each(|&(v, share)| velocities[v.index()] *= share);
         let stuck = held.iter().filter(|(_, share)| *share == 0.0);
@@ -124,8 +127,8 @@ impl Motion {
     }
 
     /// Computes velocities and displacements by semi-implicit Euler: the new velocity moves the vertex.
-    fn euler(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) {
-        self.evaluate_forces(mesh, mesh.positions(), mesh.vector(keys.velocity), context);
+    async fn euler(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext<'_>, pauses: &Pauses) {
+        self.evaluate_forces(mesh, [mesh.positions(), mesh.vector(keys.velocity)], context, pauses).await;
         let &DeformableParams { time_step, mass, damping, .. } = context.params;
         let (step, damping) = (time_step as f32 / mass as f32, damping as f32);
         let velocities = mesh.vector_mut(keys.velocity);
@@ -142,8 +145,8 @@ impl Motion {
     /// Near steps of the image, or where edits displace them repeatedly, vertices would oscillate for ever. After n
     /// recent reversals a vertex moves by 1/(n + 1) of its displacement, so it settles at the mean (Kesten,
     /// *Accelerated stochastic approximation*, 1958).
-    fn implicit(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) {
-        self.evaluate_forces(mesh, mesh.positions(), mesh.vector(keys.velocity), context);
+    async fn implicit(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext<'_>, pauses: &Pauses) {
+        self.evaluate_forces(mesh, [mesh.positions(), mesh.vector(keys.velocity)], context, pauses).await;
         let &DeformableParams { mass, damping, rigidity, stiffness, .. } = context.params;
         let (step, mass, damping) = (context.params.step_length() as f32, mass as f32, damping as f32);
         let internal = BENDING_STIFFNESS * rigidity as f32 + STRETCHING_STIFFNESS * stiffness as f32;
@@ -162,7 +165,13 @@ impl Motion {
     }
 
     /// Computes velocities and displacements by the classical fourth-order Runge–Kutta method.
-    fn runge_kutta(&mut self, mesh: &mut Mesh, keys: Keys, context: &MotionContext) {
+    async fn runge_kutta(
+        &mut self,
+        mesh: &mut Mesh,
+        keys: Keys,
+        context: &MotionContext<'_>,
+        pauses: &Pauses,
+    ) {
         let &DeformableParams { time_step, mass, damping, .. } = context.params;
         let (step, mass, damping) = (time_step as f32, mass as f32, damping as f32);
         let (x0, v0) = (mesh.positions().to_vec(), mesh.vector(keys.velocity).to_vec());
@@ -175,7 +184,7 @@ impl Motion {
             if stage > 0 {
                 self.forces.update_normals(mesh.rings(), &x, &self.awake.with_neighbours);
             }
-            self.evaluate_forces(mesh, &x, &v, context);
+            self.evaluate_forces(mesh, [&x, &v], context, pauses).await;
             for i in self.awake.moving.iter().map(|v| v.index()) {
                 let acceleration = (self.forces.force[i] - v[i] * damping) * (1.0 / mass);
                 self.displacements[i] += v[i] * (weight * step / 6.0);
@@ -191,15 +200,15 @@ impl Motion {
 
     /// Evaluates the forces on the moving vertices at given positions and velocities, with the normals last computed,
     /// and adds up the time that this takes.
-    fn evaluate_forces(
+    async fn evaluate_forces(
         &mut self,
         mesh: &Mesh,
-        positions: &[Vec3],
-        velocities: &[Vec3],
-        context: &MotionContext,
+        state: [&[Vec3]; 2],
+        context: &MotionContext<'_>,
+        pauses: &Pauses,
     ) {
         let begin = (context.clock)();
-        self.forces.evaluate(mesh.rings(), positions, velocities, &context.field, &self.awake.moving);
+        self.forces.evaluate(mesh.rings(), state, &context.field, &self.awake.moving, pauses).await;
         self.forces.milliseconds += (context.clock)() - begin;
     }
 

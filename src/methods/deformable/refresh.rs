@@ -13,6 +13,7 @@ use super::{DeformableModel, Topology};
 use crate::math::{Bounds, Vec3};
 use crate::mesh::VertexId;
 use crate::methods::{MethodError, Times};
+use crate::pauses::{Pauses, finished};
 use crate::volume::{Grid, Region, Volume};
 
 /// The distance, in voxels of the current level, from changed voxels within which vertices wake: beyond it, no sample of
@@ -36,6 +37,7 @@ impl DeformableModel {
     /// [`MethodError::Volume`] if the region is empty or not within the volume, in which cases nothing has changed, or if
     /// memory does not suffice; [`MethodError::TooManyVertices`].
     pub fn refresh(&mut self, volume: &Volume, region: Region) -> Result<(), MethodError> {
+        self.checkpoint = None;
         self.check_is_whole()?;
         let is_in_place = self.pyramid.to_world(&volume.affine()) == self.to_world;
         if volume.dims() != self.pyramid.voxel_dims() || !is_in_place {
@@ -131,7 +133,8 @@ impl DeformableModel {
         }
         let mut active = added.clone();
         self.mesh.add_neighbours(&mut active);
-        let changes = self.restore_bounds(&active, &mut Times::default());
+        let pauses = Pauses::default();
+        let changes = finished(self.restore_bounds(&active, &mut Times::default(), &pauses));
         self.count_components(changes);
         self.refreshed += changes;
         Ok(Some(added.len()))

@@ -10,6 +10,7 @@ use super::contour::{ObjectIs, contour, simplified};
 use super::{DeformableModel, Topology};
 use crate::mesh::{DisjointSets, Mesh, TriangleMesh, VertexId};
 use crate::methods::MethodError;
+use crate::pauses::Pauses;
 use crate::spatial::TriangleTree;
 
 /// The distance from the mesh, in voxels of the finer level, above which the mesh lacks a point of the finer level's
@@ -31,7 +32,7 @@ impl DeformableModel {
     ///
     /// # Errors
     /// If the contour does not fit into memory.
-    pub(super) fn renewal(&self) -> Result<Renewal, MethodError> {
+    pub(super) async fn renewal(&self, pauses: &Pauses) -> Result<Renewal, MethodError> {
         if self.params.iso_force == 0.0 || self.params.topology == Topology::Fixed {
             return Ok(Renewal::default());
         }
@@ -39,11 +40,13 @@ impl DeformableModel {
         let image = &self.pyramid.levels[level];
         let iso = self.pyramid.iso(&self.params);
         let contour = contour(image, iso, object, self.smallest_part())?;
-        let (removed, added) =
-            self.components_to_replace(&contour, COVERED_DISTANCE / image.voxels_per_unit())?;
+        pauses.now().await;
+        let covered = COVERED_DISTANCE / image.voxels_per_unit();
+        let (removed, added) = self.components_to_replace(&contour, covered, pauses).await?;
         if added.triangles.is_empty() {
             return Ok(Renewal::default());
         }
+        pauses.now().await;
         let added = simplified(added, image, self.pyramid.delta_at(self.finest_delta, level));
         Ok(Renewal { removed, added: Mesh::from_triangles(&added)? })
     }
@@ -53,13 +56,14 @@ impl DeformableModel {
     /// Components of mesh and contour within `covered_distance` of each other form groups. Groups with a point of the
     /// contour further than `covered_distance` from the mesh are replaced; components of the mesh near no contour are
     /// removed, too.
-    fn components_to_replace(
+    async fn components_to_replace(
         &self,
         contour: &TriangleMesh,
         covered_distance: f32,
+        pauses: &Pauses,
     ) -> Result<(Vec<VertexId>, TriangleMesh), MethodError> {
         let surface = self.mesh.to_triangles();
-        let tree = TriangleTree::new(&surface)?;
+        let tree = TriangleTree::in_slices(&surface, pauses).await?;
         let (part_of_contour, part_of_surface) =
             (contour.component_of_each_vertex(), surface.component_of_each_vertex());
         let first = contour.positions.len();
@@ -68,6 +72,7 @@ impl DeformableModel {
         let mut near = Vec::new();
         let label = |t: u32| part_of_surface[surface.triangles[t as usize][0] as usize];
         for (&p, &part) in contour.positions.iter().zip(&part_of_contour) {
+            pauses.after(1).await;
             tree.labels_within(p, f64::from(covered_distance), label, &mut near);
             is_left_out[part as usize] |= near.is_empty();
             near.iter().for_each(|&other| groups.union(part as usize, first + other as usize));

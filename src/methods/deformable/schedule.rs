@@ -4,7 +4,7 @@ use super::renewal::Renewal;
 use super::{DeformableModel, DeformableParams, Integrator, Topology, image_guide};
 use crate::mesh::VertexId;
 use crate::methods::{MethodError, Times};
-use crate::pauses::{Pauses, finished};
+use crate::pauses::Pauses;
 use crate::remesh::{Changes, Sampling};
 use serde::{Deserialize, Serialize};
 
@@ -114,7 +114,11 @@ impl DeformableModel {
     /// Counts quiet iterations, those with energy and speed below their bounds. After enough of them it sets sizes and
     /// seeds missing parts on the finest level, examines all vertices, checks the whole mesh, and descends one level or
     /// ends the run. Returns the numbers of edits.
-    pub(super) fn update_convergence(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+    pub(super) async fn update_convergence(
+        &mut self,
+        times: &mut Times,
+        pauses: &Pauses,
+    ) -> Result<Changes, MethodError> {
         let may_move = self.convergence.began_on_contour || self.leaves_fronts();
         let is_slow = may_move || self.speed.fastest < self.settled_speed();
         let quiet = is_slow && self.energy() < self.params.energy_tolerance;
@@ -125,10 +129,10 @@ impl DeformableModel {
         if self.convergence.refreshed > 0 {
             self.convergence.refreshed = 0;
             self.convergence.done = true;
-            return Ok(self.check_moved(times));
+            return Ok(self.check_moved(times, pauses).await);
         }
         if self.level == 0 {
-            let changes = self.size_and_seed(times)?;
+            let changes = self.size_and_seed(times, pauses).await?;
             if self.convergence.quiet == 0 {
                 return Ok(changes);
             }
@@ -141,29 +145,30 @@ impl DeformableModel {
             return Ok(Changes::default());
         }
         if self.level == 0 {
-            self.balance_volumes()?;
+            self.balance_volumes(pauses).await?;
         }
-        let mut changes = self.check_everything(times);
+        let mut changes = self.check_everything(times, pauses).await;
         if self.level == 0 {
             self.convergence.done = true;
             return Ok(changes);
         }
-        changes += self.descend(times)?;
+        changes += self.descend(times, pauses).await?;
         Ok(changes)
     }
 
     /// Sets the sizes of vertices, local factors on δ, on the finest level; if they are set already, seeds missing
     /// parts instead. If that changed anything, quiet iterations are counted anew. Edits wake only the vertices around
     /// them. Returns the numbers of edits.
-    fn size_and_seed(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+    async fn size_and_seed(&mut self, times: &mut Times, pauses: &Pauses) -> Result<Changes, MethodError> {
         if self.set_sizes() {
             self.convergence.quiet = 0;
-            return Ok(self.check_everything(times));
+            pauses.now().await;
+            return Ok(self.check_everything(times, pauses).await);
         }
         if !self.seeds_levels() || self.convergence.searches == MAX_SEARCHES {
             return Ok(Changes::default());
         }
-        let found = self.seed_missing(times)?;
+        let found = self.seed_missing(times, pauses).await?;
         self.convergence.searches += 1;
         if found.seeds > 0 {
             self.convergence.quiet = 0;
@@ -193,16 +198,16 @@ impl DeformableModel {
 
     /// Restores edge bounds and resolves contacts around all vertices, and removes negligibly small components; does
     /// nothing if the topology is fixed. Returns the numbers of edits.
-    pub(super) fn check_everything(&mut self, times: &mut Times) -> Changes {
+    pub(super) async fn check_everything(&mut self, times: &mut Times, pauses: &Pauses) -> Changes {
         if self.params.topology == Topology::Fixed {
             return Changes::default();
         }
         let all = self.followed_vertices();
-        let mut changes = self.restore_bounds(&all, times);
+        let mut changes = self.restore_bounds(&all, times, pauses).await;
         let sampling = self.sampling();
         let image = &self.pyramid.levels[self.level];
         let guide = image_guide::guide_within(image, self.level_iso, &self.params, self.followed_bounds());
-        changes.vanished += self.resolver.remove_negligible(&mut self.mesh, sampling, &*guide);
+        changes.vanished += self.resolver.remove_negligible(&mut self.mesh, sampling, &*guide, pauses).await;
         drop(guide);
         self.mark_checked();
         changes
@@ -210,14 +215,14 @@ impl DeformableModel {
 
     /// Restores edge bounds and resolves contacts around the vertices that have moved since they were last checked, and
     /// removes negligibly small components; does nothing if the topology is fixed. Returns the numbers of edits.
-    fn check_moved(&mut self, times: &mut Times) -> Changes {
+    async fn check_moved(&mut self, times: &mut Times, pauses: &Pauses) -> Changes {
         if self.params.topology == Topology::Fixed {
             return Changes::default();
         }
         let checked = self.mesh.vector(self.keys.checked_position);
         let has_moved = |v: &VertexId| checked[v.index()] != self.mesh.position(*v);
         let moved: Vec<VertexId> = self.mesh.vertices().filter(has_moved).collect();
-        let changes = self.restore_bounds(&moved, times);
+        let changes = self.restore_bounds(&moved, times, pauses).await;
         let (positions, checked) = self.mesh.positions_and_vector_mut(self.keys.checked_position);
         moved.iter().for_each(|v| checked[v.index()] = positions[v.index()]);
         changes
@@ -226,31 +231,32 @@ impl DeformableModel {
     /// Refines the mesh and descends to the next finer level of the image pyramid (figure 13). In runs that seed,
     /// components that lack part of the finer contour are replaced by it; if that fails, missing parts are seeded
     /// instead. Returns the numbers of edits.
-    fn descend(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+    async fn descend(&mut self, times: &mut Times, pauses: &Pauses) -> Result<Changes, MethodError> {
         let begin = (self.clock)();
-        let renewal = if self.seeds_levels() { self.renewal()? } else { Renewal::default() };
+        let renewal = if self.seeds_levels() { self.renewal(pauses).await? } else { Renewal::default() };
         let seeds = renewal.added.component_count() as u32;
-        let is_renewed = seeds > 0 && self.try_to_renew(&renewal);
+        let is_renewed = seeds > 0 && self.try_to_renew(&renewal, pauses).await;
         times.add("renewal", (self.clock)() - begin);
         if is_renewed {
             return Ok(Changes { seeds, ..Changes::default() });
         }
         let room = if self.pyramid.is_sparse() { self.expected_below() } else { 0 };
-        self.descend_refined()?;
+        self.descend_refined(pauses).await?;
         self.resolver.reorder(&mut self.mesh, room);
         self.mark_checked();
-        let mut changes = self.check_everything(times);
+        pauses.now().await;
+        let mut changes = self.check_everything(times, pauses).await;
         if seeds > 0 {
-            changes += self.seed_missing(times)?;
+            changes += self.seed_missing(times, pauses).await?;
         }
         Ok(changes)
     }
 
     /// Tries to descend one level by [`Self::descend_renewed`], and returns whether that succeeded; if not, mesh, level
     /// and pending vertices are restored.
-    fn try_to_renew(&mut self, renewal: &Renewal) -> bool {
+    async fn try_to_renew(&mut self, renewal: &Renewal, pauses: &Pauses) -> bool {
         let (level, coarse, waiting) = (self.level, self.mesh.clone(), self.resolver.pending());
-        let is_renewed = self.descend_renewed(renewal).is_ok();
+        let is_renewed = self.descend_renewed(renewal, pauses).await.is_ok();
         if !is_renewed {
             let failed = std::mem::replace(&mut self.mesh, coarse);
             self.mesh.advance_versions_past(&failed);
@@ -265,20 +271,20 @@ impl DeformableModel {
     ///
     /// # Errors
     /// If there would be too many vertices, the result intersects itself, or memory does not suffice.
-    fn descend_renewed(&mut self, renewal: &Renewal) -> Result<(), MethodError> {
+    async fn descend_renewed(&mut self, renewal: &Renewal, pauses: &Pauses) -> Result<(), MethodError> {
         renewal.removed.iter().for_each(|&v| _ = self.mesh.remove_component(v));
-        self.descend_refined()?;
+        self.descend_refined(pauses).await?;
         self.check_vertex_limit(&renewal.added)?;
         let added = self.mesh.append(&renewal.added)?;
         self.initialise_attributes(&added);
-        finished(self.resolve_contour(&Pauses::default()))?;
+        self.resolve_contour(pauses).await?;
         self.mark_checked();
         Ok(())
     }
 
-    fn descend_refined(&mut self) -> Result<(), MethodError> {
+    async fn descend_refined(&mut self, pauses: &Pauses) -> Result<(), MethodError> {
         let before = self.model_delta();
-        self.refine()?;
+        self.refine(pauses).await?;
         self.level -= 1;
         self.begin_sizes(before / self.model_delta());
         self.convergence.began = self.iteration;
@@ -286,7 +292,7 @@ impl DeformableModel {
         self.prepare_level()
     }
 
-    fn refine(&mut self) -> Result<(), MethodError> {
+    async fn refine(&mut self, pauses: &Pauses) -> Result<(), MethodError> {
         let (times, most) = (self.refinements(), self.resolver.max_vertices());
         // Each adds a vertex to every triangle, and makes three of it.
         let new = (3u64.saturating_pow(times) - 1) / 2;
@@ -298,7 +304,7 @@ impl DeformableModel {
         for _ in 0..times {
             // If the mesh cannot be refined, edges that are too long on the finer level are split.
             let sampling = Sampling::new(self.model_delta());
-            self.resolver.refine(&mut self.mesh, sampling)?;
+            self.resolver.refine_in_slices(&mut self.mesh, sampling, pauses).await?;
         }
         Ok(())
     }

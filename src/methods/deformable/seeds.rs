@@ -12,6 +12,7 @@ use super::{DeformableModel, MEAN_EDGE, Topology};
 use crate::math::{Vec3, triangle};
 use crate::mesh::{DisjointSets, Mesh, TriangleMesh, VertexId};
 use crate::methods::{MethodError, StepReport, Times};
+use crate::pauses::{Pauses, finished};
 use crate::remesh::Changes;
 use crate::spatial::{CellSet, TriangleTree};
 use crate::volume::{Grid, Subdivided, marching_cubes, voxels_inside};
@@ -26,6 +27,9 @@ const CLEARANCE: f64 = 0.9;
 /// separate parts.
 const SMALLEST_SEED: f64 = 1.0 / 32.0;
 
+/// The number of voxels around a part whose contour is a unit of work.
+const VOXELS_PER_UNIT: usize = 16;
+
 /// The volume of the octahedron of the six neighbours of a voxel, in voxels; the contour of a single voxel encloses no
 /// more, so single voxels may be too small for a seed.
 const MAX_VOLUME_OF_ONE_VOXEL: f64 = 4.0 / 3.0;
@@ -39,9 +43,10 @@ impl DeformableModel {
     /// [`MethodError::InvalidArgument`] on a sparse volume, or for edges too long for the object;
     /// [`MethodError::TooManyVertices`]; [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
     pub fn seed(&mut self) -> Result<StepReport, MethodError> {
+        self.checkpoint = None;
         self.check_is_whole()?;
         let mut times = Times::default();
-        let changes = self.seed_missing(&mut times)?;
+        let changes = finished(self.seed_missing(&mut times, &Pauses::default()))?;
         if changes.seeds > 0 {
             self.wake_all();
             self.count_components(changes);
@@ -51,25 +56,31 @@ impl DeformableModel {
 
     /// Adds closed contours of the matter and the cavities on this level that the mesh lacks, and restores edge bounds
     /// and contacts around them. Returns the numbers of edits, with that of the contours as `seeds`.
-    pub(super) fn seed_missing(&mut self, times: &mut Times) -> Result<Changes, MethodError> {
+    pub(super) async fn seed_missing(
+        &mut self,
+        times: &mut Times,
+        pauses: &Pauses,
+    ) -> Result<Changes, MethodError> {
         if self.params.iso_force == 0.0 || self.params.topology == Topology::Fixed {
             return Ok(Changes::default());
         }
         let begin = (self.clock)();
         let mut seeds = Mesh::default();
-        for kind in self.missing_parts()?.iter().filter(|kind| !kind.triangles.is_empty()) {
+        for kind in self.missing_parts(pauses).await?.iter().filter(|kind| !kind.triangles.is_empty()) {
             seeds.append(&Mesh::from_triangles(kind)?)?;
         }
         let (mut changes, mut added) = (Changes::default(), Vec::new());
         if seeds.vertex_count() > 0 {
+            pauses.now().await;
             (changes, added) = self.add_components(&seeds)?;
+            pauses.now().await;
         }
         times.add("seeding", (self.clock)() - begin);
         if changes.seeds > 0 {
             if self.convergence.sized {
                 self.set_sizes_of(&added);
             }
-            changes += self.restore_bounds(&added, times);
+            changes += self.restore_bounds(&added, times, pauses).await;
         }
         Ok(changes)
     }
@@ -134,19 +145,23 @@ impl DeformableModel {
 
     /// Returns the contours of matter and of cavities, in this order, that the mesh lacks on the current level; closed
     /// surfaces in model space.
-    fn missing_parts(&self) -> Result<[TriangleMesh; 2], MethodError> {
+    async fn missing_parts(&self, pauses: &Pauses) -> Result<[TriangleMesh; 2], MethodError> {
         let image = &self.pyramid.levels[self.level];
         let object = ObjectIs::by(&self.params);
         let dims = image.part_grid().0.dims();
         let indexed = |mesh| placed(mesh, |p| image.part_index(p));
         // The contour, in a large image the larger of the two meshes, is freed before the other is made.
         let contour = contour(image, self.level_iso, object, self.smallest_part())?;
+        pauses.now().await;
         let in_contour = voxels_inside(&indexed(contour), dims);
+        pauses.now().await;
         let surface = indexed(self.mesh.to_triangles());
         let in_mesh = voxels_inside(&surface, dims);
         let comparison = Comparison { image, iso: self.level_iso, object, in_contour, in_mesh, surface };
         let smallest = SMALLEST_SEED * self.smallest_part();
-        Ok([comparison.parts(Missing::Matter, smallest)?, comparison.parts(Missing::Cavity, smallest)?])
+        pauses.now().await;
+        let matter = comparison.parts(Missing::Matter, smallest, pauses).await?;
+        Ok([matter, comparison.parts(Missing::Cavity, smallest, pauses).await?])
     }
 }
 
@@ -170,9 +185,14 @@ impl Comparison<'_> {
 
     /// Returns closed surfaces, in model space, around the voxels of missing matter or of missing cavities, as `kind`
     /// tells; each encloses at least `smallest` voxels of the finest level.
-    fn parts(&self, kind: Missing, smallest: f64) -> Result<TriangleMesh, MethodError> {
+    async fn parts(
+        &self,
+        kind: Missing,
+        smallest: f64,
+        pauses: &Pauses,
+    ) -> Result<TriangleMesh, MethodError> {
         let (dims, position) = (self.grid().dims(), self.image.part_grid().1);
-        let missing = self.missing_voxels(kind)?;
+        let missing = self.missing_voxels(kind, pauses).await?;
         let voxel = 1.0 / f64::from(self.image.voxels_per_unit());
         let mut clusters = clusters(&missing, dims);
         clusters.retain(|cluster| {
@@ -182,6 +202,7 @@ impl Comparison<'_> {
         for cluster in clusters {
             let (low, high) = bounding_box(&cluster, dims);
             let field = self.field(kind, &cluster, [low, high]);
+            pauses.after(1 + field.values.len() / VOXELS_PER_UNIT).await;
             let offset = Vec3::from(low.map(|k| k as f32));
             parts.append(&placed(marching_cubes(&field, 0.0)?, |p| position(p + offset)));
         }
@@ -199,17 +220,23 @@ impl Comparison<'_> {
 
     /// Returns the grid indices of missing voxels, in ascending order: those on the wrong side of the mesh, see
     /// [`Self::misplaced_voxels`], that are further from it than [`CLEARANCE`].
-    fn missing_voxels(&self, kind: Missing) -> Result<Vec<usize>, MethodError> {
-        let mut missing = self.misplaced_voxels(kind);
+    async fn missing_voxels(&self, kind: Missing, pauses: &Pauses) -> Result<Vec<usize>, MethodError> {
+        let missing = self.misplaced_voxels(kind);
         if missing.is_empty() {
             return Ok(missing);
         }
         let dims = self.grid().dims();
         let mut cells = CellSet::new(CLEARANCE as f32 + longest_edge(&self.surface));
         missing.iter().for_each(|&voxel| cells.insert_around(coordinates(dims, voxel)));
-        let tree = TriangleTree::new(&self.surface_near(&cells))?;
-        missing.retain(|&voxel| !tree.is_within(coordinates(dims, voxel), CLEARANCE));
-        Ok(missing)
+        let tree = TriangleTree::in_slices(&self.surface_near(&cells), pauses).await?;
+        let mut far = Vec::new();
+        for voxel in missing {
+            pauses.after(1).await;
+            if !tree.is_within(coordinates(dims, voxel), CLEARANCE) {
+                far.push(voxel);
+            }
+        }
+        Ok(far)
     }
 
     /// Returns the grid indices, in ascending order, of the voxels on the wrong side of the mesh, such as object

@@ -11,17 +11,14 @@
 use super::awake::ITERATIONS_TO_SLEEP;
 use super::contour::ObjectIs;
 use super::image::{LevelImage, Pyramid, REDUCTION, SparseLevels};
-use super::motion::SpeedSummary;
-use super::schedule::Convergence;
 use super::sizes::LARGEST;
-use super::{DeformableModel, DeformableParams, Keys, Origin, Seeding, Start, Topology, coarse};
+use super::{DeformableModel, DeformableParams, Keys, Origin, Progress, Seeding, Start, Topology, coarse};
 use crate::math::order::{median, sort_ranks};
 use crate::math::{Bounds, DAffine3, DVec3, Vec3};
 use crate::mesh::{Connectivity, Mesh, ScalarKey, VertexId};
 use crate::methods::saved::Hash;
 use crate::methods::{MethodError, StepReport};
 use crate::pauses::{Pauses, finished};
-use crate::remesh::{Changes, Pending};
 use crate::volume::{BrickBox, BrickGrid, BrickId, CellCache, SparseVolume, merged};
 use fixedbitset::FixedBitSet;
 
@@ -87,16 +84,7 @@ pub(super) struct Before {
     vertices: VertexStates,
     /// The part that only edits change; `None` while vertices are moved.
     edited: Option<BeforeEdits>,
-    waiting: Pending,
-    level: usize,
-    level_iso: f32,
-    image_force_factor: f32,
-    needs_factor: bool,
-    iteration: u32,
-    convergence: Convergence,
-    speed: SpeedSummary,
-    components: u32,
-    refreshed: Changes,
+    progress: Progress,
 }
 
 /// The part of the state of some vertices that motion changes, in the order of their slots.
@@ -198,7 +186,7 @@ impl DeformableModel {
     /// Makes one iteration if all bricks that it reads are loaded.
     pub(super) fn step_if_loaded(&mut self) -> Result<StepReport, MethodError> {
         let Some(SparseLevels { volume, finest, .. }) = self.pyramid.sparse.clone() else {
-            return self.iterate(None);
+            return finished(self.iterate(None, &Pauses::default()));
         };
         // Locked all the time, so that other models of the volume wait.
         let mut bricks = volume.bricks();
@@ -223,7 +211,7 @@ impl DeformableModel {
             return Err(needs);
         }
         let (mut before, level) = (self.before(), self.level);
-        let result = self.iterate(Some(&mut before));
+        let result = finished(self.iterate(Some(&mut before), &Pauses::default()));
         let result = self.check_missed().and(result);
         if let Err(MethodError::NeedsData { .. }) = result {
             self.undo(before);
@@ -326,20 +314,7 @@ impl DeformableModel {
     }
 
     fn before(&self) -> Before {
-        Before {
-            vertices: VertexStates::default(),
-            edited: None,
-            waiting: self.resolver.pending(),
-            level: self.level,
-            level_iso: self.level_iso,
-            image_force_factor: self.image_force_factor,
-            needs_factor: self.needs_factor,
-            iteration: self.iteration,
-            convergence: self.convergence,
-            speed: self.speed,
-            components: self.components,
-            refreshed: self.refreshed,
-        }
+        Before { vertices: VertexStates::default(), edited: None, progress: self.progress_so_far() }
     }
 
     fn undo(&mut self, before: Before) {
@@ -350,18 +325,9 @@ impl DeformableModel {
             mesh.scalar_mut(keys.size).copy_from_slice(&sizes);
         }
         before.vertices.put_back(mesh, *keys);
-        self.resolver.set_pending(before.waiting);
         self.resolver.take_overflow();
         self.motion.free_buffers();
-        self.level = before.level;
-        self.level_iso = before.level_iso;
-        self.image_force_factor = before.image_force_factor;
-        self.needs_factor = before.needs_factor;
-        self.iteration = before.iteration;
-        self.convergence = before.convergence;
-        self.speed = before.speed;
-        self.components = before.components;
-        self.refreshed = before.refreshed;
+        self.set_back_progress(before.progress);
     }
 
     /// Returns the factor on α_I, the strength of the image force, of a sparse level, by the steepness of the image at the

@@ -186,7 +186,7 @@ impl DeformableModel {
             resolved?;
             let sampling = self.sampling();
             let guard = self.resolver.embedding(&self.mesh, sampling);
-            let intersecting = guard.intersecting_vertices(&self.mesh);
+            let intersecting = guard.intersecting_vertices_in_slices(&self.mesh, pauses).await;
             if intersecting.is_empty() || guard.separate(&mut self.mesh, &intersecting) {
                 self.convergence.began_on_contour = self.from_contour;
                 return Ok(());
@@ -254,7 +254,7 @@ async fn resolve_with(
     if let Some(most) = resolver.take_overflow() {
         return Err(MethodError::TooManyVertices { most });
     }
-    resolver.remove_negligible(mesh, sampling, guide);
+    resolver.remove_negligible(mesh, sampling, guide, pauses).await;
     Ok(())
 }
 

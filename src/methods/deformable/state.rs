@@ -77,6 +77,7 @@ impl DeformableModel {
     /// attractor in it is invalid, [`MethodError::Volume`] if the gradient image does not fit into memory; the model is
     /// unchanged then.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
+        self.checkpoint = None;
         let (mut needs_factor, mut began) = (false, 0);
         let state: State;
         if self.pyramid.is_sparse() {

@@ -11,7 +11,8 @@ use super::params::MultiresParams;
 use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, MeshError, TriangleMesh};
 use crate::methods::MethodError;
-use crate::remesh::{Embedding, Unchecked, restructure};
+use crate::pauses::Pauses;
+use crate::remesh::{Embedding, Unchecked, restructure_in_slices};
 use crate::spatial::SurfacePoint;
 use crate::volume::{Lattice, SurfaceExtractor};
 use std::rc::Rc;
@@ -31,20 +32,26 @@ const MAX_MISSED: f64 = 0.02;
 /// # Errors
 /// [`MethodError::InvalidArgument`] if no smoother surface has `detail` as a graph over it; [`MethodError::Mesh`] if
 /// `detail` is not a closed manifold.
-pub(super) fn decomposition(
+pub(super) async fn decomposition(
     detail: TriangleMesh,
     ellipsoids: &[Ellipsoid],
     params: &MultiresParams,
+    pauses: &Pauses,
 ) -> Result<Vec<Rc<Band>>, MethodError> {
     let mut mesh = Mesh::from_triangles(&detail)?;
+    pauses.now().await;
     let mut bands = vec![Band::of(detail)?];
-    restructure(&mut mesh, params.bounds(), &mut Unchecked);
+    pauses.now().await;
+    restructure_in_slices(&mut mesh, params.bounds(), &mut Unchecked, pauses).await;
     let mut last_good = None;
     for round in 0..ROUNDS {
         let round_params = MultiresParams { smoothing: 1 + round as u32 / 2, ..params.clone() };
+        pauses.now().await;
         solve(&mut mesh, ellipsoids, &round_params, params.levels.min(round as u32 / 4));
+        pauses.now().await;
         let candidate = Band::of(mesh.to_triangles())?;
-        let is_graph = is_embedded(&mesh) && missed_share(&candidate, &bands) <= MAX_MISSED;
+        let is_graph =
+            is_embedded(&mesh, pauses).await && missed_share(&candidate, &bands, pauses).await <= MAX_MISSED;
         if is_graph {
             let has_converged = residual(&mesh, ellipsoids, params.energy) <= TOLERANCE * params.target();
             last_good = Some((candidate, mesh.clone()));
@@ -78,19 +85,19 @@ fn no_base() -> MethodError {
     )
 }
 
-fn is_embedded(mesh: &Mesh) -> bool {
+async fn is_embedded(mesh: &Mesh, pauses: &Pauses) -> bool {
     let mut guard = Embedding::default();
     guard.sync_with_edge(mesh, super::typical_edge(mesh));
-    guard.is_embedded(mesh)
+    guard.intersecting_vertices_in_slices(mesh, pauses).await.is_empty()
 }
 
 /// Returns the share of the triangles of `coarse` whose normal at the centroid misses the next finer surface, the last
 /// of `bands`, or hits its back: above [`MAX_MISSED`], `coarse` is too smooth.
-fn missed_share(coarse: &Rc<Band>, bands: &[Rc<Band>]) -> f64 {
+async fn missed_share(coarse: &Rc<Band>, bands: &[Rc<Band>], pauses: &Pauses) -> f64 {
     let Some(fine) = bands.last() else { return 0.0 };
-    let search_distance = search_distance(coarse, fine);
+    let search_distance = search_distance(coarse, fine, pauses).await;
     let count = coarse.walker.mesh().positions.len();
-    let missed = (0..coarse.walker.mesh().triangles.len()).filter(|&t| {
+    let is_missed = |t: usize| {
         let third = Vec3::splat(1.0 / 3.0);
         let [a, b, c] = coarse.walker.corners(t as u32);
         let at = BasePoint { triangle: t as u32, weights: third, point: (a + b + c) * third };
@@ -100,8 +107,13 @@ fn missed_share(coarse: &Rc<Band>, bands: &[Rc<Band>]) -> f64 {
             normal_at(&fine.walker, &fine.normals, &found.into()).dot((b - a).cross(c - a)) <= 0.0
         };
         hit.is_none_or(faces_back)
-    });
-    missed.count() as f64 / (2 * count).max(1) as f64
+    };
+    let mut missed = 0;
+    for t in 0..coarse.walker.mesh().triangles.len() {
+        missed += usize::from(is_missed(t));
+        pauses.after(1).await;
+    }
+    missed as f64 / (2 * count).max(1) as f64
 }
 
 /// Builds the base of a model without detail: the surface of the union of the ellipsoids, tightened to a membrane
@@ -110,14 +122,17 @@ fn missed_share(coarse: &Rc<Band>, bands: &[Rc<Band>]) -> f64 {
 /// # Errors
 /// [`MethodError::InvalidArgument`] if the lattice of [`union_of`] would have more than [`MAX_NODES`] nodes along an
 /// axis.
-pub(super) fn membrane_around(
+pub(super) async fn membrane_around(
     ellipsoids: &[Ellipsoid],
     params: &MultiresParams,
+    pauses: &Pauses,
 ) -> Result<TriangleMesh, MethodError> {
     let tight = union_of(ellipsoids, params.target())?;
+    pauses.now().await;
     let mut mesh = Mesh::from_triangles(&tight)?;
     solve(&mut mesh, ellipsoids, params, params.levels);
-    Ok(if is_embedded(&mesh) { mesh.to_triangles() } else { tight })
+    pauses.now().await;
+    Ok(if is_embedded(&mesh, pauses).await { mesh.to_triangles() } else { tight })
 }
 
 /// Returns the surface of the union of the ellipsoids, from which [`membrane_around`] starts, with edges of about

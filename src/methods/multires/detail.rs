@@ -6,6 +6,7 @@ use super::prisms::PrismLookup;
 use crate::math::Vec3;
 use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::mesh::{Mesh, MeshError, TriangleMesh, VertexId};
+use crate::pauses::{Pauses, finished};
 use crate::remesh::Embedding;
 use crate::spatial::SurfaceWalker;
 use std::rc::Rc;
@@ -49,12 +50,16 @@ struct BandLookup {
 
 impl Bands {
     /// Prepares the surfaces of a decomposition, from coarse to fine with the base first, for [`Self::detail_at`].
-    pub fn new(all: Vec<Rc<Band>>) -> Self {
-        let lookup = |pair: &[Rc<Band>]| {
-            let search_distance = search_distance(&pair[0], &pair[1]);
-            BandLookup { search_distance, prisms: PrismLookup::new(&pair[0], &pair[1], search_distance) }
-        };
-        Self { lookups: all.windows(2).map(lookup).collect(), all }
+    /// Pauses meanwhile.
+    pub async fn new(all: Vec<Rc<Band>>, pauses: &Pauses) -> Self {
+        let mut lookups = Vec::new();
+        for pair in all.windows(2) {
+            let search_distance = search_distance(&pair[0], &pair[1], pauses).await;
+            let prisms = PrismLookup::new(&pair[0], &pair[1], search_distance);
+            lookups.push(BandLookup { search_distance, prisms });
+            pauses.now().await;
+        }
+        Self { lookups, all }
     }
 
     pub fn base(&self) -> &Band {
@@ -83,13 +88,17 @@ impl Bands {
     }
 }
 
+/// The number of vertices whose closest points are found between two counts of the work.
+const CHUNK: usize = 16;
+
 /// The largest distance along the normals of a band at which a hit on the next finer band counts, as a multiple of the
 /// largest distance between the two.
 const SEARCH_FACTOR: f64 = 2.0;
 
-/// Returns the largest distance along a normal of `from` at which a hit on `to` counts, in units of the mesh.
-pub(super) fn search_distance(from: &Band, to: &Band) -> f64 {
-    SEARCH_FACTOR * hausdorff_bound(from, to)
+/// Returns the largest distance along a normal of `from` at which a hit on `to` counts, in units of the mesh. Pauses
+/// meanwhile.
+pub(super) async fn search_distance(from: &Band, to: &Band, pauses: &Pauses) -> f64 {
+    SEARCH_FACTOR * hausdorff_bound(from, to, pauses).await
 }
 
 /// Maximum number of bands above the base: the number of distances that a [`Detail`] has space for.
@@ -118,12 +127,16 @@ impl Band {
 }
 
 /// Returns the largest distance from a vertex of either surface to the other surface, for [`search_distance`].
-fn hausdorff_bound(a: &Band, b: &Band) -> f64 {
-    let one_way = |from: &Band, to: &Band| {
-        let distances = from.walker.mesh().positions.iter().filter_map(|&p| to.walker.closest(p));
-        distances.map(|found| found.distance).fold(0.0, f64::max)
-    };
-    one_way(a, b).max(one_way(b, a))
+async fn hausdorff_bound(a: &Band, b: &Band, pauses: &Pauses) -> f64 {
+    let mut largest: f64 = 0.0;
+    for (from, to) in [(a, b), (b, a)] {
+        for some in from.walker.mesh().positions.chunks(CHUNK) {
+            let distances = some.iter().filter_map(|&p| to.walker.closest(p));
+            largest = distances.map(|found| found.distance).fold(largest, f64::max);
+            pauses.after(CHUNK).await;
+        }
+    }
+    largest
 }
 
 /// The deformed base with its detail, as reconstructed by [`detailed`].
@@ -157,21 +170,34 @@ pub(super) fn detailed(
     guard: &mut Embedding,
     sampling: DetailSampling,
 ) -> Detailed {
+    finished(detailed_in_slices(surface, correspondence, bands, guard, sampling, &Pauses::default()))
+}
+
+/// Does what [`detailed`] does, and pauses meanwhile.
+pub(super) async fn detailed_in_slices(
+    surface: &Mesh,
+    correspondence: &Correspondence,
+    bands: &Bands,
+    guard: &mut Embedding,
+    sampling: DetailSampling,
+    pauses: &Pauses,
+) -> Detailed {
     let mut fine = DetailSamples::new(surface, correspondence, bands);
     for _ in 0..sampling.rounds {
+        pauses.now().await;
         fine.refine(bands, sampling.longest);
     }
-    let detailed = displace(fine, bands, guard);
+    let detailed = displace(fine, bands, guard, pauses).await;
     if sampling.rounds > 0 && guard.still_intersects(&detailed.mesh) {
         // A part of the membrane is so small that rounding dominates: edge midpoints then cause intersections.
-        return displace(DetailSamples::new(surface, correspondence, bands), bands, guard);
+        return displace(DetailSamples::new(surface, correspondence, bands), bands, guard, pauses).await;
     }
     detailed
 }
 
 /// Displaces the vertices of `samples` by their detail, band by band; `guard` shortens displacements that would cause
 /// self-intersections.
-fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Detailed {
+async fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding, pauses: &Pauses) -> Detailed {
     let DetailSamples { mut mesh, normals, details: detail, .. } = samples;
     let mut held_vertices = 0;
     for k in 0..bands.lookups.len() {
@@ -182,11 +208,13 @@ fn displace(samples: DetailSamples, bands: &Bands, guard: &mut Embedding) -> Det
         }
         guard.sync_with_edge(&mesh, super::typical_edge(&mesh));
         let intended = displacements.clone();
-        let back = guard.move_all(&mut mesh, &mut displacements);
+        let all: Vec<VertexId> = mesh.vertices().collect();
+        pauses.now().await;
+        let back = guard.move_some_in_slices(&mut mesh, &all, &mut displacements, pauses).await;
         held_vertices += back.len();
         if !back.is_empty() {
             let mut displacements = spread_hold_back(&mesh, &intended, &back);
-            guard.move_all(&mut mesh, &mut displacements);
+            guard.move_some_in_slices(&mut mesh, &all, &mut displacements, pauses).await;
         }
     }
     let missed = mesh.vertices().filter(|v| detail[v.index()].is_missed).count();

@@ -18,6 +18,7 @@ use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::math::{Bounds, Vec3, triangle};
 use crate::mesh::{EditError, Mesh, MeshError, TriangleMesh, VertexId, geodesic_distances_from};
 use crate::methods::Times;
+use crate::pauses::Pauses;
 use crate::remesh::{Changes, Embedding};
 use crate::spatial::SurfaceWalker;
 use crate::warning::{Warning, WarningCode};
@@ -99,17 +100,24 @@ pub(super) struct SavedHandles {
 }
 
 impl Held {
-    /// Prepares a closed surface and its handles; edges longer than `longest` are halved before anything moves.
+    /// Prepares a closed surface and its handles; edges longer than `longest` are halved before anything moves. Pauses
+    /// meanwhile.
     ///
     /// # Errors
     /// [`MeshError`] for a surface that is not closed.
-    pub fn new(surface: &Band, ellipsoids: &[ControlEllipsoid], longest: f64) -> Result<Self, MeshError> {
+    pub async fn in_slices(
+        surface: &Band,
+        ellipsoids: &[ControlEllipsoid],
+        longest: f64,
+        pauses: &Pauses,
+    ) -> Result<Self, MeshError> {
         let walker = &surface.walker;
         let given = Mesh::from_triangles(walker.mesh())?;
         let bounds = Bounds::from_points(&walker.mesh().positions);
         let mut start = Placed { mesh: given.clone(), points: identity(walker), distances: Vec::new() };
         let most = given.vertex_count() + MOST_ADDED;
         for _ in 0..PASSES {
+            pauses.now().await;
             let length = |now: &Placed, u, v| f64::from(now.mesh.position(u).distance(now.mesh.position(v)));
             if halve_edges(&mut start, walker, |now, u, v| length(now, u, v) > longest, Mesh::split) == 0
                 || start.mesh.vertex_count() >= most
@@ -119,6 +127,8 @@ impl Held {
         }
         let reach = REACH * f64::from(bounds.min.distance(bounds.max));
         let mut now = start.clone();
+        pauses.now().await;
+        let crossings = Crossings::of(walker.mesh());
         let mut held = Self {
             handles: Vec::new(),
             reach,
@@ -129,9 +139,10 @@ impl Held {
             is_unsettled: false,
             has_stopped: false,
             halvings: 0,
-            crossings: Crossings::of(walker.mesh()),
+            crossings,
         };
         for ellipsoid in ellipsoids {
+            pauses.now().await;
             held.add(Ellipsoid::new(ellipsoid), &mut now)?;
         }
         held.distances = now.distances;
@@ -511,6 +522,7 @@ fn halve_edges(
 mod tests {
     use super::*;
     use crate::math::Random;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -522,7 +534,8 @@ mod tests {
             let mut mesh = Mesh::icosphere(Vec3::ZERO, 1.0, 0.7).unwrap().to_triangles();
             mesh.positions.iter_mut().for_each(|p| *p *= 0.2 + 3.0 * random.unit() as f32);
             mesh.normals = None;
-            let held = Held::new(&Band::of(mesh).unwrap(), &[], 0.1).unwrap();
+            let band = Band::of(mesh).unwrap();
+            let held = finished(Held::in_slices(&band, &[], 0.1, &Pauses::default())).unwrap();
             let Placed { mesh, points, .. } = held.start();
             assert!(mesh.vertex_count() > 1000, "seed {seed}");
             let off = |v: VertexId| mesh.position(v).distance(points[v.index()].point);

@@ -48,11 +48,12 @@ pub use params::{Energy, MultiresParams, Support, Topology};
 use super::method::method;
 use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::{DVec3, triangle};
-use crate::mesh::{Mesh, TriangleMesh, measure};
-use crate::remesh::{Changes, Embedding, restructure};
+use crate::mesh::{Mesh, TriangleMesh, VertexId, measure};
+use crate::pauses::{Pauses, finished};
+use crate::remesh::{Changes, Embedding, restructure_in_slices};
 use containment::contains_centres;
 use correspondence::{Correspondence, Current, folded, project};
-use detail::{Bands, DetailSampling, Detailed, detailed};
+use detail::{Bands, DetailSampling, Detailed, detailed, detailed_in_slices};
 use ellipsoid::{Ellipsoid, check_ellipsoids, check_tips};
 use held::{Held, Placed};
 use membrane::{pushed_positions, solve_with};
@@ -151,8 +152,17 @@ impl MultiresolutionModel {
     /// [`MethodError::Mesh`] for a detail or a base that is invalid, open or not manifold, or for a base that
     /// intersects itself; [`MethodError::TooManyVertices`] if the edge bounds are too short for the area of the base.
     pub fn new(options: MultiresOptions) -> Result<Self, MethodError> {
+        finished(Self::begin(options))
+    }
+
+    /// Begins to create a model as [`Self::new`] does, in [slices](crate::pauses).
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub async fn begin(options: MultiresOptions) -> Result<Self, MethodError> {
+        let pauses = &Pauses::default();
         if options.support == Support::Surface {
-            return Self::holding_itself(options);
+            return Self::holding_itself(options, pauses).await;
         }
         let MultiresOptions { detail, base, ellipsoids: given, params, .. } = options;
         check_ellipsoids(&given)?;
@@ -160,32 +170,40 @@ impl MultiresolutionModel {
         let [detail, base] = [detail, base].map(|mesh| mesh.map(|mesh| space.mesh(mesh)));
         let moving = MovingEllipsoids::new(&space.ellipsoids(&given));
         let ellipsoids = moving.now();
-        let (bands, params) = set_up(detail, base, &ellipsoids, space.params(&params))?;
-        let bands = Bands::new(bands);
+        pauses.now().await;
+        let (bands, params) = set_up(detail, base, &ellipsoids, space.params(&params), pauses).await?;
+        let bands = Bands::new(bands, pauses).await;
         let surface = Mesh::from_triangles(bands.base().walker.mesh())?;
-        Self::from_parts(space, bands, moving, params, surface)
+        Self::from_parts(space, bands, moving, params, surface, pauses).await
     }
 
-    fn from_parts(
+    async fn from_parts(
         space: ModelSpace,
         bands: Bands,
         moving: MovingEllipsoids,
         params: MultiresParams,
         base: Mesh,
+        pauses: &Pauses,
     ) -> Result<Self, MethodError> {
         let mut surface = base;
         check_size(area(&surface), &params)?;
         let mut guard = Embedding::default();
         guard.sync_with_edge(&surface, typical_edge(&surface));
-        restructure(&mut surface, params.bounds(), &mut guard);
+        restructure_in_slices(&mut surface, params.bounds(), &mut guard, pauses).await;
         let positions = pushed_positions(&surface, &moving.now());
         let mut displacements = displacements_to(&surface, &positions);
-        guard.move_all(&mut surface, &mut displacements);
+        let all: Vec<VertexId> = surface.vertices().collect();
+        guard.move_some_in_slices(&mut surface, &all, &mut displacements, pauses).await;
+        pauses.now().await;
         let walker = &bands.base().walker;
         let identity = identity(walker);
         let before = Current { walker, correspondence: &identity };
         let correspondence = project(&surface, &before, walker, f64::MAX);
-        let detailed = detailed(&surface, &correspondence, &bands, &mut guard, detail_sampling(&params));
+        pauses.now().await;
+        let sampling = detail_sampling(&params);
+        let detailed =
+            detailed_in_slices(&surface, &correspondence, &bands, &mut guard, sampling, pauses).await;
+        pauses.now().await;
         let mut model = Self {
             params: space.params_in_world(&params),
             space,
@@ -209,7 +227,7 @@ impl MultiresolutionModel {
     }
 
     /// Creates a model of a surface that holds itself.
-    fn holding_itself(options: MultiresOptions) -> Result<Self, MethodError> {
+    async fn holding_itself(options: MultiresOptions, pauses: &Pauses) -> Result<Self, MethodError> {
         let MultiresOptions { detail, base, ellipsoids: given, params, .. } = options;
         let Some(detail) = detail.filter(|_| base.is_none()) else {
             return Err(cannot_hold_itself(base.is_some()));
@@ -218,13 +236,16 @@ impl MultiresolutionModel {
             check_ellipsoids(&given)?;
         }
         let space = ModelSpace::of(Some(&detail), &given);
+        pauses.now().await;
         let (surface, params) = set_up_surface(space.mesh(detail), space.params(&params))?;
+        pauses.now().await;
         let mut ellipsoids = space.ellipsoids(&given);
         if ellipsoids.is_empty() {
-            ellipsoids = proposed(&surface);
+            ellipsoids = proposed(&surface, pauses).await;
             check_ellipsoids(&ellipsoids)?;
         }
-        let held = Held::new(&surface, &ellipsoids, params.edge_max)?;
+        let held = Held::in_slices(&surface, &ellipsoids, params.edge_max, pauses).await?;
+        pauses.now().await;
         let Placed { mesh, points, .. } = held.start().clone();
         let shown = identity(&surface.walker);
         let detailed = Detailed {
@@ -237,7 +258,7 @@ impl MultiresolutionModel {
             params: space.params_in_world(&params),
             space,
             components: measure(surface.walker.mesh()).components as u32,
-            bands: Bands::new(vec![surface]),
+            bands: Bands::new(vec![surface], pauses).await,
             ellipsoids: MovingEllipsoids::new(&ellipsoids),
             model_params: params,
             surface: mesh,

@@ -3,6 +3,7 @@
 use super::ControlEllipsoid;
 use super::detail::Band;
 use crate::math::{Bounds, DVec3, Vec3, triangle};
+use crate::pauses::Pauses;
 
 /// Number of points of the surface at which a ball inside is searched for.
 const PLACES: usize = 1500;
@@ -21,7 +22,8 @@ const TOUCH: f64 = 0.01;
 const STEPS: usize = 30;
 
 /// Proposes balls inside a closed surface as handles, at least one unless it is flat everywhere.
-pub(super) fn proposed(surface: &Band) -> Vec<ControlEllipsoid> {
+/// Pauses meanwhile.
+pub(super) async fn proposed(surface: &Band, pauses: &Pauses) -> Vec<ControlEllipsoid> {
     let bounds = Bounds::from_points(&surface.walker.mesh().positions);
     let diagonal = f64::from(bounds.min.distance(bounds.max));
     let apart = APART * diagonal;
@@ -30,6 +32,7 @@ pub(super) fn proposed(surface: &Band) -> Vec<ControlEllipsoid> {
         // Closest points are hard to tell in the middle of a sphere: one of its balls is enough.
         if !balls.iter().any(|ball| ball.touches(at[0])) {
             balls.extend(inner_ball(surface, at, diagonal));
+            pauses.after(STEPS).await;
         }
     }
     let largest = balls.iter().map(|ball| ball.radius).fold(0.0, f64::max);

@@ -9,6 +9,7 @@ use crate::math::{DVec3, Vec3};
 use crate::mesh::{Mesh, TriangleMesh, measure};
 use crate::methods::MethodError;
 use crate::methods::caller_mesh::check_edges;
+use crate::pauses::Pauses;
 use crate::spatial::SurfaceWalker;
 use std::rc::Rc;
 
@@ -22,11 +23,12 @@ const DEFAULT_TRIANGLES: f64 = 10_000.0;
 /// # Errors
 /// [`MethodError::Mesh`] and [`MethodError::InvalidArgument`] for surfaces, ellipsoids or parameters that are not
 /// accepted; [`MethodError::TooManyVertices`] for edge bounds that are too short.
-pub(super) fn set_up(
+pub(super) async fn set_up(
     detail: Option<TriangleMesh>,
     base: Option<TriangleMesh>,
     ellipsoids: &[Ellipsoid],
     params: MultiresParams,
+    pauses: &Pauses,
 ) -> Result<(Vec<Rc<Band>>, MultiresParams), MethodError> {
     let sized = |area: f64| {
         let params = params.clone().with_target(edge_for(area, DEFAULT_TRIANGLES));
@@ -37,7 +39,9 @@ pub(super) fn set_up(
     let bands = match (detail, base) {
         (detail, Some(base)) => {
             let base = validate_closed("base", base)?;
+            pauses.now().await;
             check_embedded(&base)?;
+            pauses.now().await;
             let params = sized(measure(&base).area)?;
             let mut bands = vec![Band::of(base)?];
             if let Some(detail) = detail {
@@ -48,12 +52,13 @@ pub(super) fn set_up(
         (Some(detail), None) => {
             let detail = validate_closed("detail", detail)?;
             let params = sized(measure(&detail).area)?;
-            (decomposition(detail, ellipsoids, &params)?, params)
+            pauses.now().await;
+            (decomposition(detail, ellipsoids, &params, pauses).await?, params)
         }
         (None, None) => {
             let ball = |e: &Ellipsoid| 4.0 * std::f64::consts::PI * e.lengths.length_squared() / 3.0;
             let params = sized(ellipsoids.iter().map(ball).sum())?;
-            (vec![Band::of(membrane_around(ellipsoids, &params)?)?], params)
+            (vec![Band::of(membrane_around(ellipsoids, &params, pauses).await?)?], params)
         }
     };
     check_touching(ellipsoids, &bands.0[0].walker, bands.1.target())?;

@@ -6,16 +6,20 @@ use super::{Embedding, NEAREST_CORNER, Nearby, PIERCING, SEARCH_SKIN};
 use crate::math::order::{combined_rank, sort_ranks};
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{Mesh, VertexId, sort_distinct};
+use crate::pauses::Pauses;
 use crate::spatial::{Proximity, VertexBall, near_pairs};
 
 /// The whole mesh is swept for near vertices if at least one vertex in this many has a pending search for its
 /// neighbours; otherwise the grid is queried around these vertices only. Tuned by timing.
 const MANY: usize = 8;
 
+/// The number of pairs of vertices whose tests are a unit of work.
+const TESTS_PER_UNIT: usize = 256;
+
 impl Embedding {
     /// Measures the longest edge at each of the `dirty` vertices; for those with a pending search for non-adjacent
     /// vertices near them, updates the position in the grid and finds the pairs anew.
-    pub(super) fn update_pairs(&mut self, mesh: &Mesh, dirty: &[VertexId]) {
+    pub(super) async fn update_pairs(&mut self, mesh: &Mesh, dirty: &[VertexId], pauses: &Pauses) {
         let is_entered = self.entered == Some(mesh.geometry_version());
         let count = dirty.iter().filter(|&&v| self.is_searched_around(v)).count();
         let many = MANY * count >= mesh.vertex_count();
@@ -40,9 +44,9 @@ impl Embedding {
             }
         }
         if many {
-            self.sweep(mesh);
+            self.sweep(mesh, pauses).await;
         } else if count > 0 {
-            self.search(mesh, dirty);
+            self.search(mesh, dirty, pauses).await;
         }
     }
 
@@ -52,7 +56,7 @@ impl Embedding {
 
     /// Finds pairs of non-adjacent vertices near each other by a sweep over the part of the mesh that is searched, and
     /// stores those of which at least one has a pending search.
-    pub(super) fn sweep(&mut self, mesh: &Mesh) {
+    pub(super) async fn sweep(&mut self, mesh: &Mesh, pauses: &Pauses) {
         let proximity = self.proximity();
         let (mut searched, mut longest) = (Bounds::EMPTY, 0.0f32);
         for ball in mesh.vertices().map(|v| self.grid.ball(v)) {
@@ -67,16 +71,18 @@ impl Embedding {
         let is_near = |v: &VertexId| wide.contains(self.grid.position(*v));
         let mut balls = Vec::with_capacity(mesh.vertices().filter(is_near).count());
         balls.extend(mesh.vertices().filter(is_near).map(|v| self.grid.ball(v)));
-        near_pairs(balls, proximity, |a, b| {
+        pauses.now().await;
+        let add = |a: &VertexBall, b: &VertexBall| {
             if self.is_searched_around(a.vertex) || self.is_searched_around(b.vertex) {
                 self.add_pair(mesh, a, b, proximity);
             }
-        });
+        };
+        near_pairs(balls, proximity, add, pauses).await;
     }
 
     /// Finds pairs of non-adjacent vertices near each other, of which at least one is `dirty` and has a pending search,
     /// by grid queries, one for all those in the same cell.
-    pub(super) fn search(&mut self, mesh: &Mesh, dirty: &[VertexId]) {
+    pub(super) async fn search(&mut self, mesh: &Mesh, dirty: &[VertexId], pauses: &Pauses) {
         let proximity = self.proximity();
         let searched = dirty.iter().filter(|&&v| self.is_searched_around(v));
         let mut searched: Vec<u64> = searched.map(|&v| combined_rank(self.grid.cell_key(v), v.0)).collect();
@@ -94,6 +100,7 @@ impl Embedding {
             for v in cell.iter().map(vertex) {
                 self.add_pairs_of(mesh, &self.grid.ball(v), &near, proximity);
             }
+            pauses.after(1 + cell.len() * near.len() / TESTS_PER_UNIT).await;
         }
     }
 

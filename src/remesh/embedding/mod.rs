@@ -31,6 +31,7 @@ mod tolerated;
 
 use crate::math::{Bounds, DAffine3, higher, resize, resize_within, triangle};
 use crate::mesh::{EditError, Mesh, MeshError, VertexId};
+use crate::pauses::Pauses;
 use crate::spatial::VertexGrid;
 use certificates::Certificates;
 use motion_bound::{Checks, MotionBounds};
@@ -250,6 +251,11 @@ impl Embedding {
     /// Returns the corners of all triangles that intersect another, sorted by id; exact.
     pub fn intersecting_vertices(&mut self, mesh: &Mesh) -> Vec<VertexId> {
         self.check_all(mesh)
+    }
+
+    /// Does what [`Self::intersecting_vertices`] does, and pauses meanwhile.
+    pub async fn intersecting_vertices_in_slices(&mut self, mesh: &Mesh, pauses: &Pauses) -> Vec<VertexId> {
+        self.check_all_in_slices(mesh, pauses).await
     }
 
     /// Returns the total work of all edits so far, counted mainly in nearby vertices visited, by which

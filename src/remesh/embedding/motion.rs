@@ -4,6 +4,7 @@ use super::Embedding;
 use super::motion_bound::Checks;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId};
+use crate::pauses::{Pauses, finished};
 use std::collections::BTreeMap;
 
 /// The factor on the displacement of vertices of intersecting triangles; if triangles still intersect after that, these
@@ -34,7 +35,18 @@ impl Embedding {
         moving: &[VertexId],
         displacements: &mut [Vec3],
     ) -> Vec<(VertexId, f32)> {
-        self.move_some_unless(mesh, moving, displacements, usize::MAX).unwrap_or_default()
+        finished(self.move_some_in_slices(mesh, moving, displacements, &Pauses::default()))
+    }
+
+    /// Does what [`Self::move_some`] does, and pauses meanwhile.
+    pub async fn move_some_in_slices(
+        &mut self,
+        mesh: &mut Mesh,
+        moving: &[VertexId],
+        displacements: &mut [Vec3],
+        pauses: &Pauses,
+    ) -> Vec<(VertexId, f32)> {
+        self.try_to_move(mesh, moving, displacements, usize::MAX, pauses).await.unwrap_or_default()
     }
 
     /// Moves vertices as [`Self::move_some`] does; returns `None`, with nothing moved, if more than `most` of them would
@@ -45,6 +57,17 @@ impl Embedding {
         moving: &[VertexId],
         displacements: &mut [Vec3],
         most: usize,
+    ) -> Option<Vec<(VertexId, f32)>> {
+        finished(self.try_to_move(mesh, moving, displacements, most, &Pauses::default()))
+    }
+
+    async fn try_to_move(
+        &mut self,
+        mesh: &mut Mesh,
+        moving: &[VertexId],
+        displacements: &mut [Vec3],
+        most: usize,
+        pauses: &Pauses,
     ) -> Option<Vec<(VertexId, f32)>> {
         self.sync_without_cells(mesh);
         let from: Vec<Vec3> = moving.iter().map(|&v| mesh.position(v)).collect();
@@ -57,7 +80,7 @@ impl Embedding {
         // Ends, since each round shortens the displacement of a vertex, to a quarter and then to 0, and holds those alone
         // that have one.
         loop {
-            let intersecting = self.check_dirty(mesh);
+            let intersecting = self.check_dirty_in_slices(mesh, pauses).await;
             let can_be_held = |v: &VertexId| displacements[v.index()] != Vec3::ZERO;
             let held = intersecting.iter().filter(|v| can_be_held(v));
             // Each with its index among the moving ones.

@@ -9,9 +9,16 @@ use super::one_ring::{
 use super::{Embedding, Nearby};
 use crate::math::higher;
 use crate::mesh::{Mesh, VertexId, sort_distinct};
+use crate::pauses::{Pauses, finished};
 
 /// The clearance of a pair, relative to the ordinary edge, above which no further filter is tried.
 const AMPLE: f32 = 0.03;
+
+/// The number of vertices that are checked between two counts of the work.
+const CHUNK: usize = 32;
+
+/// The number of pairs of one-rings whose tests are a unit of work.
+const PAIRS_PER_UNIT: usize = 16;
 
 /// The checks that test pairs of triangles.
 const PAIRS: [Check; 2] = [Check::OneRing, Check::Nearby];
@@ -20,21 +27,32 @@ impl Embedding {
     /// Runs all collision checks at every vertex, as [`Self::check_dirty`] does but regardless of certificates; returns
     /// the corners of all triangles that intersect another, sorted by id.
     pub(super) fn check_all(&mut self, mesh: &Mesh) -> Vec<VertexId> {
+        finished(self.check_all_in_slices(mesh, &Pauses::default()))
+    }
+
+    /// Does what [`Self::check_all`] does, and pauses meanwhile.
+    pub(super) async fn check_all_in_slices(&mut self, mesh: &Mesh, pauses: &Pauses) -> Vec<VertexId> {
         self.sync_without_cells(mesh);
         self.resize_for_checks(mesh);
         mesh.vertices().for_each(|v| self.mark_dirty(v, Checks::ALL));
-        self.check(mesh, true)
+        pauses.now().await;
+        self.check(mesh, true, pauses).await
     }
 
     /// Runs the pending collision checks of all vertices that have any, and stores the clearances found as motion
     /// bounds and certificates. Returns the corners of all triangles that intersect another, sorted by id.
     pub(super) fn check_dirty(&mut self, mesh: &Mesh) -> Vec<VertexId> {
-        self.check(mesh, false)
+        finished(self.check_dirty_in_slices(mesh, &Pauses::default()))
     }
 
-    fn check(&mut self, mesh: &Mesh, anew: bool) -> Vec<VertexId> {
+    /// Does what [`Self::check_dirty`] does, and pauses meanwhile.
+    pub(super) async fn check_dirty_in_slices(&mut self, mesh: &Mesh, pauses: &Pauses) -> Vec<VertexId> {
+        self.check(mesh, false, pauses).await
+    }
+
+    async fn check(&mut self, mesh: &Mesh, anew: bool, pauses: &Pauses) -> Vec<VertexId> {
         let dirty = std::mem::take(&mut self.dirty);
-        self.update_pairs(mesh, &dirty);
+        self.update_pairs(mesh, &dirty, pauses).await;
         for (&v, check) in dirty.iter().flat_map(|v| PAIRS.map(|check| (v, check))) {
             if self.pending[v.index()].has(check) {
                 self.motion_bounds[v.index()].set(check, f32::INFINITY);
@@ -44,20 +62,30 @@ impl Embedding {
             self.certificates.prepare(v, mesh.ring(v).valence(), anew);
         }
         let mut intersecting = Vec::new();
-        for &v in &dirty {
-            let pending = self.pending[v.index()];
-            if pending.has(Check::OneRing) {
-                self.check_one_ring(mesh, v, &mut intersecting);
-                self.check_along_edges(mesh, v, &mut intersecting);
-            }
-            if pending.has(Check::Nearby) {
-                self.check_nearby(mesh, v, &mut intersecting);
-            }
+        for some in dirty.chunks(CHUNK) {
+            let pairs: usize = some.iter().map(|&v| self.check_vertex(mesh, v, &mut intersecting)).sum();
+            pauses.after(pairs / PAIRS_PER_UNIT).await;
         }
         dirty.iter().for_each(|v| self.pending[v.index()] = Checks::default());
         self.tolerated.remove_from(&mut intersecting);
         sort_distinct(&mut intersecting);
         intersecting
+    }
+
+    /// Runs the pending collision checks of a vertex; returns about how many pairs were tested.
+    fn check_vertex(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) -> usize {
+        let pending = self.pending[v.index()];
+        let mut pairs = 0;
+        if pending.has(Check::OneRing) {
+            self.check_one_ring(mesh, v, intersecting);
+            self.check_along_edges(mesh, v, intersecting);
+            pairs += mesh.ring(v).valence();
+        }
+        if pending.has(Check::Nearby) {
+            self.check_nearby(mesh, v, intersecting);
+            pairs += self.near(v).len();
+        }
+        pairs
     }
 
     fn check_one_ring(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) {
@@ -299,9 +327,9 @@ mod tests {
             dirty.iter().for_each(|&v| embedding.mark_dirty(v, Checks::ALL));
             embedding.may_touch.fill(false);
             let (mut swept, mut searched) = (embedding.clone(), embedding);
-            swept.sweep(&mesh);
+            finished(swept.sweep(&mesh, &Pauses::default()));
             searched.grid.link_cells();
-            searched.search(&mesh, &dirty);
+            finished(searched.search(&mesh, &dirty, &Pauses::default()));
             for v in mesh.vertices() {
                 let [swept, searched] = [&swept, &searched].map(|embedding| {
                     let mut near: Vec<VertexId> = embedding.near(v).iter().map(|near| near.vertex).collect();

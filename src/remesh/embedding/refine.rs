@@ -2,6 +2,7 @@
 
 use super::Embedding;
 use crate::mesh::{Mesh, MeshError, VertexId};
+use crate::pauses::{Pauses, finished};
 
 impl Embedding {
     /// Refines the mesh as [`Mesh::refine`] does, and flips new edges back if their triangles would intersect others.
@@ -13,12 +14,20 @@ impl Embedding {
     /// # Errors
     /// As [`Mesh::refine`].
     pub fn refine(&mut self, mesh: &mut Mesh) -> Result<bool, MeshError> {
+        finished(self.refine_in_slices(mesh, &Pauses::default()))
+    }
+
+    /// Does what [`Self::refine`] does, and pauses meanwhile.
+    ///
+    /// # Errors
+    /// As [`Mesh::refine`].
+    pub async fn refine_in_slices(&mut self, mesh: &mut Mesh, pauses: &Pauses) -> Result<bool, MeshError> {
         self.free();
         let (before, slots) = (mesh.connectivity(), mesh.slots());
         mesh.refine()?;
         let is_new = |v: &VertexId| v.index() >= slots;
         loop {
-            let intersecting = self.check_all(mesh);
+            let intersecting = self.check_all_in_slices(mesh, pauses).await;
             if intersecting.is_empty() {
                 return Ok(true);
             }

@@ -4,7 +4,8 @@ use super::one_ring::{Move, OneRing, angle_quality, has_better_angle, min_qualit
 use super::session::Session;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, OppositeVertices, VertexId};
-use crate::remesh::restructure::{MIN_VALENCE, may_collapse, may_flip};
+use crate::pauses::Pauses;
+use crate::remesh::restructure::{MIN_VALENCE, Work, may_collapse, may_flip};
 use crate::remesh::{Changes, EdgeBounds, EditPolicy};
 
 /// The squared sine of 33°: triangles with a smaller angle are improved.
@@ -22,13 +23,14 @@ const MOVES: usize = 4;
 const MAX_VALENCE: usize = 10;
 
 /// Improves triangle angles below 33° by flips, collapses and moves that keep edge lengths within bounds or bring them
-/// nearer to them; returns the numbers of edits.
-pub(super) fn improve_angles<E: EditPolicy>(
+/// nearer to them; returns the numbers of edits. Pauses meanwhile.
+pub(super) async fn improve_angles<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
-    session: &mut Session<E>,
+    session: &mut Session<'_, E>,
+    pauses: &Pauses,
 ) -> Changes {
-    let mut changes = Changes::default();
+    let (mut changes, mut work) = (Changes::default(), Work::new(session, pauses));
     // Failed attempts are repeated only around vertices where something has changed.
     let mut changed = vec![true; mesh.slots()];
     for _ in 0..ROUNDS {
@@ -47,6 +49,7 @@ pub(super) fn improve_angles<E: EditPolicy>(
                     ring.as_slice().iter().chain([&v]).for_each(|w| changed[w.index()] = true);
                 }
                 changes += here;
+                work.count(session).await;
             }
         }
     }

@@ -20,10 +20,11 @@ mod one_ring;
 mod relax;
 mod session;
 
-use super::restructure::{collapse_short, flip_for_valence, split_long};
+use super::restructure::restructure_in_slices;
 use super::unit_scale::unit_scale;
 use super::{Changes, EdgeBounds, EditPolicy, Embedding, Unchecked};
 use crate::mesh::{MAX_VERTICES, Mesh, MeshError};
+use crate::pauses::{Pauses, finished};
 use conflicts::ConflictMask;
 use min_angle::improve_angles;
 use relax::relax;
@@ -64,6 +65,18 @@ const INPUT_TEST_RUN: usize = 1;
 /// [`MeshError::Precision`] if `max` is below 64 times the spacing of single-precision numbers at the largest coordinate;
 /// [`MeshError::TooManyVertices`] if more than [`MAX_VERTICES`] would be needed. The mesh is unchanged on error.
 pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError> {
+    finished(remesh_in_slices(mesh, bounds, &Pauses::default()))
+}
+
+/// Does what [`remesh`] does, and pauses meanwhile. The mesh is valid in each pause.
+///
+/// # Errors
+/// As [`remesh`].
+pub async fn remesh_in_slices(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    pauses: &Pauses,
+) -> Result<Changes, MeshError> {
     bounds.check_for(mesh)?;
     // A mesh collapsed to one point has no surface; every edit would be tested against all its triangles.
     if is_one_point(mesh) {
@@ -72,7 +85,9 @@ pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError>
     let before = mesh.clone();
     let [shrink, grow] = unit_scale(bounds.max);
     mesh.positions_mut().iter_mut().for_each(|p| *p *= shrink);
-    let changes = remesh_scaled(mesh, bounds.scaled(shrink));
+    pauses.now().await;
+    let changes = remesh_scaled(mesh, bounds.scaled(shrink), pauses).await;
+    pauses.now().await;
     if mesh.vertex_count() >= MAX_VERTICES {
         let vertices = mesh.vertex_count() as u64;
         mesh.clone_from(&before);
@@ -92,35 +107,48 @@ fn is_one_point(mesh: &Mesh) -> bool {
 
 /// Remeshes a mesh that was scaled to edges of about 1: with unchecked edits, then with checked ones where these caused
 /// self-intersections. Returns the changes made.
-fn remesh_scaled(mesh: &mut Mesh, bounds: EdgeBounds) -> Changes {
+async fn remesh_scaled(mesh: &mut Mesh, bounds: EdgeBounds, pauses: &Pauses) -> Changes {
     let surface = mesh.clone();
     let target_edge = (bounds.min * bounds.max).sqrt();
     let mut conflicts = ConflictMask::new(&surface);
     for run in 0..UNCHECKED_RUNS {
         let mut session = Session::new(&surface, target_edge, conflicts.complement(), Unchecked);
-        let mut changes = rounds(mesh, bounds, &mut session);
+        pauses.now().await;
+        let mut changes = rounds(mesh, bounds, &mut session, pauses).await;
         let mut embedding = embedding_of(mesh, bounds.max);
-        let intersecting = embedding.intersecting_vertices(mesh);
+        let intersecting = embedding.intersecting_vertices_in_slices(mesh, pauses).await;
         let is_separated = intersecting.is_empty() || embedding.separate(mesh, &intersecting);
         let has_left_out = !conflicts.is_empty();
-        let near = if is_separated { intersecting } else { embedding.intersecting_vertices(mesh) };
+        pauses.now().await;
+        let near = if is_separated {
+            intersecting
+        } else {
+            embedding.intersecting_vertices_in_slices(mesh, pauses).await
+        };
         near.into_iter().for_each(|v| conflicts.add(session.anchor(v), mesh.position(v), target_edge));
         if is_separated && conflicts.is_empty() {
             return changes;
         }
         if is_separated {
             let mut checked = session.with(conflicts.dilated(target_edge), embedding);
-            let remesh_again = if has_left_out { rounds } else { last_round };
-            changes += remesh_again(mesh, bounds, &mut checked);
+            changes += if has_left_out {
+                rounds(mesh, bounds, &mut checked, pauses).await
+            } else {
+                last_round(mesh, bounds, &mut checked, pauses).await
+            };
             return changes;
         }
         mesh.clone_from(&surface);
-        if run == INPUT_TEST_RUN && !embedding_of(mesh, mesh.longest_edge()).is_embedded(mesh) {
-            break;
+        if run == INPUT_TEST_RUN {
+            let mut embedding = embedding_of(mesh, mesh.longest_edge());
+            if !embedding.intersecting_vertices_in_slices(mesh, pauses).await.is_empty() {
+                break;
+            }
         }
     }
     let embedding = embedding_of(mesh, bounds.max);
-    rounds(mesh, bounds, &mut Session::new(&surface, target_edge, vec![true; surface.slots()], embedding))
+    let mut session = Session::new(&surface, target_edge, vec![true; surface.slots()], embedding);
+    rounds(mesh, bounds, &mut session, pauses).await
 }
 
 fn embedding_of(mesh: &Mesh, edge: f32) -> Embedding {
@@ -129,38 +157,55 @@ fn embedding_of(mesh: &Mesh, edge: f32) -> Embedding {
     embedding
 }
 
-fn rounds<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
+async fn rounds<E: EditPolicy>(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    session: &mut Session<'_, E>,
+    pauses: &Pauses,
+) -> Changes {
     let mut changes = Changes::default();
     let inner = inner_bounds(bounds);
     for round in 0..ROUNDS {
-        let edits = pass(mesh, inner, session);
+        let edits = restructure_in_slices(mesh, inner, session, pauses).await;
         if round == 0 {
             session.reorder(mesh);
+            pauses.now().await;
         }
-        let has_moved = (0..SWEEPS).take_while(|_| relax(mesh, bounds, session) > 0).count() > 0;
+        let has_moved = sweeps(mesh, bounds, session, pauses).await;
         changes += edits;
         if !has_moved && edits == Changes::default() {
             break;
         }
     }
-    changes += last_round(mesh, bounds, session);
+    changes += last_round(mesh, bounds, session, pauses).await;
     changes
+}
+
+/// Relaxes the mesh until no vertex moves, at most [`SWEEPS`] times; returns whether any vertex moved.
+async fn sweeps<E: EditPolicy>(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    session: &mut Session<'_, E>,
+    pauses: &Pauses,
+) -> bool {
+    for sweep in 0..SWEEPS {
+        if relax(mesh, bounds, session, pauses).await == 0 {
+            return sweep > 0;
+        }
+    }
+    true
 }
 
 /// Brings edges that are still out of the requested bounds within them, and improves angles below 33°; returns the
 /// changes made.
-fn last_round<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
-    let mut changes = pass(mesh, bounds, session);
-    changes += improve_angles(mesh, bounds, session);
-    changes
-}
-
-/// Makes one round of collapses, splits and flips as [`restructure`](super::restructure()) does, with at most
-/// [`MAX_VERTICES`]; returns the changes made.
-fn pass<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> Changes {
-    let mut changes = collapse_short(mesh, bounds, session);
-    changes += split_long(mesh, bounds, MAX_VERTICES, session);
-    changes += flip_for_valence(mesh, bounds, session);
+async fn last_round<E: EditPolicy>(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    session: &mut Session<'_, E>,
+    pauses: &Pauses,
+) -> Changes {
+    let mut changes = restructure_in_slices(mesh, bounds, session, pauses).await;
+    changes += improve_angles(mesh, bounds, session, pauses).await;
     changes
 }
 

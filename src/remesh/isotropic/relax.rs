@@ -4,7 +4,10 @@
 use super::one_ring::{Move, OneRing, min_quality, moved};
 use super::session::Session;
 use crate::mesh::{Mesh, VertexId};
+use crate::pauses::Pauses;
+use crate::remesh::restructure::{Work, chunks};
 use crate::remesh::{EdgeBounds, EditPolicy};
+use std::ops::Range;
 
 /// The squared sine of 35°: relaxation may reduce the smallest angle around a vertex if it stays above this.
 const GOOD: f32 = 0.329;
@@ -15,11 +18,31 @@ const SHORTEST_STEP: f32 = 0.02;
 
 /// Relaxes each vertex in a region that may be edited: moves it along the surface to the centroid of its triangles, one
 /// vertex after the other, unless the step is too short, is rejected by [`moved`] or makes a poor angle poorer. Returns
-/// the number of vertices moved.
-pub(super) fn relax<E: EditPolicy>(mesh: &mut Mesh, bounds: EdgeBounds, session: &mut Session<E>) -> usize {
+/// the number of vertices moved. Pauses meanwhile.
+pub(super) async fn relax<E: EditPolicy>(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    session: &mut Session<'_, E>,
+    pauses: &Pauses,
+) -> usize {
+    let (mut moves, mut work) = (0, Work::new(session, pauses));
+    for slots in chunks(mesh.slots()) {
+        moves += relax_at(mesh, bounds, session, slots);
+        work.count(session).await;
+    }
+    moves
+}
+
+/// Relaxes the vertices in some slots; returns the number of vertices moved.
+fn relax_at<E: EditPolicy>(
+    mesh: &mut Mesh,
+    bounds: EdgeBounds,
+    session: &mut Session<E>,
+    slots: Range<usize>,
+) -> usize {
     let mut moves = 0;
     let shortest = SHORTEST_STEP * session.target_edge();
-    for slot in 0..mesh.slots() {
+    for slot in slots {
         let v = VertexId::from_index(slot);
         if !mesh.is_live(v) || !session.is_free(v) {
             continue;

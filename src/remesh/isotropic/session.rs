@@ -144,6 +144,10 @@ impl<E: EditPolicy> EditPolicy for Session<'_, E> {
         self.edits.attempt(mesh, edit)
     }
 
+    fn effort(&self) -> u64 {
+        self.edits.effort()
+    }
+
     fn may_collapse(&mut self, mesh: &Mesh, kept: VertexId, removed: VertexId) -> bool {
         if !self.is_free(kept) || !self.is_free(removed) {
             return false;

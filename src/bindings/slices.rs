@@ -1,0 +1,154 @@
+//! Bindings of long operations on meshes in slices of work.
+
+use std::future::Future;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::task::Poll;
+
+use js_sys::Array;
+use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
+
+use super::error::Failure;
+use super::mesh::{MeshKind, RawMesh, distances, edge_bounds, editable_copy, passes_of, read_only};
+use vesicle::mesh::Mesh;
+use vesicle::pauses::{Pauses, advance};
+use vesicle::remesh::{decimate_in_slices, decimate_within_in_slices, passes_in_slices, remesh_in_slices};
+use vesicle::spatial::surface_distance_in_slices;
+
+/// The results of an operation: the changed mesh, if it is changed, and the value that is returned.
+struct Done {
+    mesh: Option<Box<Mesh>>,
+    value: JsValue,
+}
+
+/// An operation on a mesh that is under way, on a copy.
+#[wasm_bindgen]
+pub struct RawMeshWork(Pin<Box<dyn Future<Output = Result<Done, Failure>>>>);
+
+#[wasm_bindgen]
+impl RawMeshWork {
+    /// Does a slice of the work; at the end, changes `mesh`, with which it was begun, and returns an array with the value of
+    /// the operation, after which this must not be called any more.
+    pub fn advance(&mut self, mesh: &mut RawMesh) -> Result<Option<Array>, JsValue> {
+        let Poll::Ready(done) = advance(&mut self.0) else { return Ok(None) };
+        let Done { mesh: changed, value } = done?;
+        if let Some(changed) = changed {
+            mesh.0 = MeshKind::Surface(changed);
+        }
+        Ok(Some(Array::of(&[value])))
+    }
+}
+
+impl RawMesh {
+    /// Begins to change the mesh by `edit`, which returns the value of the operation.
+    fn change(
+        &self,
+        edit: impl AsyncFnOnce(&mut Mesh, &Pauses) -> Result<JsValue, Failure> + 'static,
+    ) -> Result<RawMeshWork, JsValue> {
+        let copy = self.copy_to_edit()?;
+        Ok(RawMeshWork(Box::pin(async move {
+            let (mut mesh, pauses) = (copy.into_mesh()?, Pauses::default());
+            pauses.now().await;
+            let value = edit(&mut mesh, &pauses).await?;
+            Ok(Done { mesh: Some(mesh), value })
+        })))
+    }
+
+    fn copy_to_edit(&self) -> Result<Copy, Failure> {
+        match &self.0 {
+            MeshKind::Surface(mesh) => Ok(Copy::Surface(mesh.clone())),
+            MeshKind::Triangles(mesh, versions) => Ok(Copy::Triangles(Rc::clone(mesh), *versions)),
+            MeshKind::Live(_) => Err(read_only()),
+        }
+    }
+
+    /// Begins to decimate the mesh by `edit`, unless it is as small as that already.
+    fn decimate_by(
+        &self,
+        target_triangles: f64,
+        edit: impl AsyncFnOnce(&mut Mesh, usize, &Pauses) -> Result<(), Failure> + 'static,
+    ) -> Result<RawMeshWork, JsValue> {
+        // As by `larger_than`.
+        let target = target_triangles as usize;
+        if let MeshKind::Triangles(mesh, _) = &self.0
+            && mesh.triangles.len() <= target
+        {
+            Mesh::from_triangles(mesh).map_err(Failure::from)?;
+            return Ok(RawMeshWork(Box::pin(async { Ok(Done { mesh: None, value: JsValue::UNDEFINED }) })));
+        }
+        self.change(async move |mesh, pauses| {
+            edit(mesh, target, pauses).await?;
+            Ok(JsValue::UNDEFINED)
+        })
+    }
+}
+
+/// A copy of a mesh, which becomes an editable one.
+enum Copy {
+    Surface(Box<Mesh>),
+    Triangles(Rc<vesicle::mesh::TriangleMesh>, [u32; 2]),
+}
+
+impl Copy {
+    fn into_mesh(self) -> Result<Box<Mesh>, Failure> {
+        match self {
+            Self::Surface(mesh) => Ok(mesh),
+            Self::Triangles(mesh, versions) => Ok(Box::new(editable_copy(&mesh, versions)?)),
+        }
+    }
+}
+
+#[wasm_bindgen]
+impl RawMesh {
+    /// Begins what `remesh` does.
+    #[wasm_bindgen(js_name = remeshInSlices)]
+    pub fn remesh_in_slices(&self, min: f64, max: f64) -> Result<RawMeshWork, JsValue> {
+        let bounds = edge_bounds(min, max);
+        self.change(async move |mesh, pauses| {
+            remesh_in_slices(mesh, bounds, pauses).await?;
+            Ok(JsValue::UNDEFINED)
+        })
+    }
+
+    /// Begins what `restructure` does; the value is the number of edits.
+    #[wasm_bindgen(js_name = restructureInSlices)]
+    pub fn restructure_in_slices(&self, min: f64, max: f64, passes: &[u8]) -> Result<RawMeshWork, JsValue> {
+        let (bounds, passes) = (edge_bounds(min, max), passes_of(passes));
+        self.change(async move |mesh, pauses| {
+            let changes = passes_in_slices(mesh, bounds, &passes, pauses).await?;
+            Ok((changes.creations + changes.deletions + changes.inversions).into())
+        })
+    }
+
+    /// Begins what `decimate` does.
+    #[wasm_bindgen(js_name = decimateInSlices)]
+    pub fn decimate_in_slices(&self, target_triangles: f64) -> Result<RawMeshWork, JsValue> {
+        self.decimate_by(target_triangles, async |mesh, target, pauses| {
+            decimate_in_slices(mesh, target, pauses).await;
+            Ok(())
+        })
+    }
+
+    /// Begins what `decimateWithin` does.
+    #[wasm_bindgen(js_name = decimateWithinInSlices)]
+    pub fn decimate_within_in_slices(
+        &self,
+        target_triangles: f64,
+        max_distance: f64,
+    ) -> Result<RawMeshWork, JsValue> {
+        self.decimate_by(target_triangles, async move |mesh, target, pauses| {
+            decimate_within_in_slices(mesh, target, max_distance, pauses).await?;
+            Ok(())
+        })
+    }
+
+    /// Begins what `distanceTo` does, between the two surfaces as they are now; the value is a `SurfaceDistance`.
+    #[wasm_bindgen(js_name = distanceToInSlices)]
+    pub fn distance_to_in_slices(&self, other: &RawMesh) -> RawMeshWork {
+        let (mesh, other) = (self.triangles(), other.triangles());
+        RawMeshWork(Box::pin(async move {
+            let found = surface_distance_in_slices(&mesh, &other, &Pauses::default()).await?;
+            Ok(Done { mesh: None, value: distances(&found)? })
+        }))
+    }
+}

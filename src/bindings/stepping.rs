@@ -1,0 +1,108 @@
+//! Models whose steps go in slices, shared between their raw handles and live meshes.
+
+use std::cell::{RefCell, RefMut};
+use std::future::Future;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::task::Poll;
+
+use vesicle::math::DVec3;
+use vesicle::mesh::TriangleMesh;
+use vesicle::methods::{LiveSurface, Method, MethodError, StepReport};
+use vesicle::pauses::{advance, finished};
+
+use super::convert::now;
+
+pub type Computation<T> = Pin<Box<dyn Future<Output = T>>>;
+
+/// A method whose steps go in slices.
+pub trait Sliced: Method + 'static {
+    /// Makes a step as [`Method::step`] does, and pauses meanwhile.
+    fn step_in_slices(&mut self) -> impl Future<Output = Result<StepReport, MethodError>>;
+
+    /// Sets the model back to the end of the last step, after the future of a step was dropped.
+    fn discard_step(&mut self);
+}
+
+/// A model, of which a step may be under way: whatever is asked of it then ends it first, so that a step changes all or
+/// nothing for those who look.
+pub struct Stepping<M> {
+    model: Rc<RefCell<M>>,
+    /// The step under way, which borrows the model until it ends or is dropped.
+    step: RefCell<Option<Computation<Result<StepReport, MethodError>>>>,
+    /// The report of a step that was ended by whoever asked for something, until a run takes it.
+    ended: RefCell<Option<Result<StepReport, MethodError>>>,
+}
+
+impl<M: Sliced> Stepping<M> {
+    pub fn new(mut model: M) -> Rc<Self> {
+        model.set_clock(now);
+        let model = Rc::new(RefCell::new(model));
+        Rc::new(Self { model, step: RefCell::default(), ended: RefCell::default() })
+    }
+
+    /// Returns the model, after the step that is under way.
+    pub fn ready(&self) -> RefMut<'_, M> {
+        let under_way = self.step.borrow_mut().take();
+        if let Some(step) = under_way {
+            self.ended.replace(Some(finished(step)));
+        }
+        self.model.borrow_mut()
+    }
+
+    /// Does a slice of the step that is under way, or begins one; returns its report at its end, or that of one that has ended
+    /// since the last slice.
+    pub fn advance(&self) -> Option<Result<StepReport, MethodError>> {
+        if let Some(report) = self.ended.take() {
+            return Some(report);
+        }
+        let under_way = self.step.borrow_mut().take();
+        let mut step = under_way.unwrap_or_else(|| Box::pin(stepped(Rc::clone(&self.model))));
+        match advance(&mut step) {
+            Poll::Pending => {
+                self.step.replace(Some(step));
+                None
+            }
+            Poll::Ready(report) => Some(report),
+        }
+    }
+
+    /// Gives up the step that is under way.
+    pub fn discard(&self) {
+        self.ended.take();
+        let under_way = self.step.borrow_mut().take();
+        if under_way.is_some() {
+            drop(under_way);
+            self.model.borrow_mut().discard_step();
+        }
+    }
+}
+
+#[allow(
+    clippy::await_holding_refcell_ref,
+    reason = "whoever else wants the model ends or drops the step first"
+)]
+async fn stepped<M: Sliced>(model: Rc<RefCell<M>>) -> Result<StepReport, MethodError> {
+    model.borrow_mut().step_in_slices().await
+}
+
+/// The live surface of a model whose steps go in slices.
+pub struct LiveStepping<M>(pub Rc<Stepping<M>>);
+
+impl<M: Sliced> LiveSurface for LiveStepping<M> {
+    fn surface(&self) -> TriangleMesh {
+        self.0.ready().surface()
+    }
+
+    fn origin(&self) -> DVec3 {
+        LiveSurface::origin(&*self.0.ready())
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        self.0.ready().counts()
+    }
+
+    fn versions(&self) -> [u32; 2] {
+        self.0.ready().versions()
+    }
+}
