@@ -38,7 +38,7 @@ export {
 export type { ParamSpec } from './params.js';
 export { type InitInput, init as default, initSync } from './runtime.js';
 export type { RunOptions, SliceOptions, Stepper, StepReport } from './stepper.js';
-export { Volume, type VolumeFormat } from './volume.js';
+export { Volume, type VolumeFormat, type VolumeInSlices } from './volume.js';
 export type { Warning, WarningCode } from './warning.js';
 
 /** Returns the version of the package. */

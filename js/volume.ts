@@ -15,6 +15,7 @@ import {
 } from './check.js';
 import type { LengthUnit, Space, Vec3, VolumeFileOptions, VolumeInit, VoxelArray } from './data.js';
 import { Handle } from './runtime.js';
+import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
 import * as glue from './vesicle.js';
 import { RawVolume } from './vesicle.js';
@@ -35,6 +36,12 @@ const ELEMENTS = [
   ...[Uint8Array, Int8Array, Uint16Array, Int16Array],
   ...[Uint32Array, Int32Array, Float32Array, Float64Array],
 ];
+
+/** Long operations of a volume in slices of work, as returned by {@link Volume.inSlices}. */
+export interface VolumeInSlices {
+  /** As {@link Volume.enrichSlices}. */
+  enrichSlices(options?: { factor?: number; method?: 'flow' | 'linear' }): Promise<Volume>;
+}
 
 /**
  * Returns the handle of the WebAssembly object behind a volume, for the other modules of the library; throws
@@ -282,10 +289,35 @@ export class Volume {
    * @throws {@link VesicleError} `invalid-argument`: factor out of range, or a single slice; `too-large`.
    */
   enrichSlices(options: { factor?: number; method?: 'flow' | 'linear' } = {}): Volume {
-    const { factor, method = 'flow' } = checkProperties('options', options, ['factor', 'method']);
-    if (factor !== undefined) integer('factor', factor, { min: 1 });
-    choice('method', method, ['flow', 'linear']);
-    return wrap(() => this.#handle.use((raw) => raw.enrichSlices(factor, method === 'flow')));
+    const [factor, byFlow] = enrichment(options);
+    return wrap(() => this.#handle.use((raw) => raw.enrichSlices(factor, byFlow)));
+  }
+
+  /**
+   * Returns long operations of this volume that yield to the event loop between slices of work and can be aborted. Results and
+   * errors are those of the methods of the same name, bit for bit.
+   *
+   * Entry points with one method lack it, but for `vesicle/tracking`.
+   *
+   * @param options - `signal`: aborts operations, which reject with `signal.reason`; `budgetMs`: duration of a slice of
+   *   work, milliseconds, default 12.
+   * @throws {@link VesicleError} `invalid-argument`.
+   */
+  inSlices(options?: SliceOptions): VolumeInSlices {
+    const { signal, budgetMs } = checkedSlices(options);
+    return {
+      enrichSlices: async (given = {}) => {
+        const [factor, byFlow] = enrichment(given);
+        signal?.throwIfAborted();
+        const work = new Handle('Volume', () => this.#handle.use((raw) => raw.enrichInSlices(factor, byFlow)));
+        try {
+          const raw = await runInSlices(() => work.use((one) => one.advance()), signal, budgetMs);
+          return wrap(() => raw);
+        } finally {
+          work.free();
+        }
+      },
+    };
   }
 
   /**
@@ -482,6 +514,14 @@ function counts(parameter: string, given: unknown): Uint32Array {
 }
 
 /** Returns the call that resamples to the one grid that is given. */
+/** Returns the factor and whether the optical flow is used, of {@link Volume.enrichSlices}, once they are checked. */
+function enrichment(given: { factor?: number; method?: 'flow' | 'linear' }): [number | undefined, boolean] {
+  const { factor, method = 'flow' } = checkProperties('options', given, ['factor', 'method']);
+  if (factor !== undefined) integer('factor', factor, { min: 1 });
+  choice('method', method, ['flow', 'linear']);
+  return [factor, method === 'flow'];
+}
+
 function resampling(
   grid: { dims: Vec3 } | { spacing: Vec3 } | { like: Volume },
 ): (raw: RawVolume, nearest: boolean) => RawVolume {

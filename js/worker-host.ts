@@ -151,13 +151,13 @@ class Host {
     return this.#withSignal(id, (signal) => work.call(target, ...given, { ...options, signal, ...listeners }));
   }
 
-  /** Calls an operation of `Mesh.inSlices`. */
+  /** Calls an operation of `inSlices`. */
   #sliced(id: number, { on, name, args }: Call, options: object): Promise<unknown> {
     const { target } = this.#find(on, 'inSlices');
-    lookUp(SLICED, name);
+    lookUp(lookUp(SLICED, classOf(target as unknown as LibraryObject)), name);
     const given = this.#incoming(args);
     return this.#withSignal(id, (signal) => {
-      const operations = record((target as unknown as Mesh).inSlices({ ...options, signal }));
+      const operations = record((target as unknown as Mesh | Volume).inSlices({ ...options, signal }));
       return (operations[name] as (...args: unknown[]) => Promise<unknown>)(...given);
     });
   }

@@ -1,7 +1,7 @@
 // Messages between the page and the worker, and tables of the members that may be accessed. Nothing outside these
 // tables is ever called.
 import { VesicleError } from './error.js';
-import type { ErrorCode, MeshInSlices } from './index.js';
+import type { ErrorCode, MeshInSlices, VolumeInSlices } from './index.js';
 import type { StepReport } from './stepper.js';
 import type { ClassName, FunctionName, Library } from './worker-types.js';
 
@@ -20,7 +20,7 @@ export type Task =
   | { type: 'make'; as: Reference; args: unknown[] }
   /**
    * Call of the method or property `name` of an object or class, or of a free function if `on` is undefined; `reports`
-   * requests reports of its progress. With `slices`, the options, `name` is one of the operations of `Mesh.inSlices`.
+   * requests reports of its progress. With `slices`, the options, `name` is one of the operations of `inSlices`.
    */
   | {
       type: 'call';
@@ -99,6 +99,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     pyramid: 'method',
     binned: 'method',
     enrichSlices: 'method',
+    inSlices: 'method',
     labels: 'method',
     label: 'method',
     threshold: 'method',
@@ -209,13 +210,16 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
   },
 };
 
-/** Operations of `Mesh.inSlices` that the page may call in the worker. */
-export const SLICED: Names<keyof MeshInSlices> = {
-  remesh: 'method',
-  restructure: 'method',
-  decimate: 'method',
-  decimateWithin: 'method',
-  distanceTo: 'method',
+/** Operations of `inSlices` that the page may call in the worker, by class. */
+export const SLICED: { Mesh: Names<keyof MeshInSlices>; Volume: Names<keyof VolumeInSlices> } = {
+  Mesh: {
+    remesh: 'method',
+    restructure: 'method',
+    decimate: 'method',
+    decimateWithin: 'method',
+    distanceTo: 'method',
+  },
+  Volume: { enrichSlices: 'method' },
 };
 
 /** Static methods that the page may call in the worker, by class. */

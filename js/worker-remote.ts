@@ -5,7 +5,6 @@ import { VesicleError } from './error.js';
 import type { MeshArrays, PositionOptions } from './mesh.js';
 import { checkedRun, checkedSlices, type RunOptions, type SliceOptions } from './stepper.js';
 import {
-  type ABORTABLE,
   isPlain,
   isReference,
   MEMBERS,
@@ -208,7 +207,7 @@ type Listener = (report: Report) => void;
  */
 async function abortable(
   on: Remote | ClassName,
-  name: keyof typeof ABORTABLE | keyof typeof SLICED,
+  name: string,
   args: readonly unknown[],
   signal: AbortSignal | undefined,
   { listener, slices }: { listener?: Listener | undefined; slices?: SliceOptions } = {},
@@ -298,30 +297,34 @@ function remoteClass(name: ClassName): Class {
     const call = async (...args: unknown[]) => post(currentSession(), name, method, args);
     define(proxy, method, { value: method === 'propose' ? propose : call });
   }
-  for (const [member, kind] of Object.entries(MEMBERS[name])) define(proxy.prototype, member, memberOf(member, kind));
+  for (const [member, kind] of Object.entries(MEMBERS[name]))
+    define(proxy.prototype, member, memberOf(name, member, kind));
   // Meshes are created by static methods only.
   const create = 'create' in STATICS[name] ? slicedCreator(name) : creator(proxy, name);
   if (name !== 'Mesh') define(proxy, 'create', { value: create });
   return proxy;
 }
 
-/** Implements `Mesh.inSlices`: the operations are at hand at once, and run in the worker. */
-function inSlices(remote: Remote, options?: SliceOptions): Record<string, unknown> {
+/** Implements `inSlices`: the operations are at hand at once, and run in the worker. */
+function inSlices(remote: Remote, operations: object, options?: SliceOptions): Record<string, unknown> {
   const { signal, ...slices } = checkedSlices(options);
   const operation = (name: string) => [
     name,
-    async (...args: unknown[]) => abortable(remote, name as keyof typeof SLICED, args, signal, { slices }),
+    async (...args: unknown[]) => abortable(remote, name, args, signal, { slices }),
   ];
-  return Object.fromEntries(Object.keys(SLICED).map(operation));
+  return Object.fromEntries(Object.keys(operations).map(operation));
 }
 
 const SPECIAL: Record<string, (remote: Remote, ...args: never[]) => Promise<unknown>> = { run, coverage, copyTo };
 
-function memberOf(name: string, kind: string): PropertyDescriptor {
+function memberOf(of: ClassName, name: string, kind: string): PropertyDescriptor {
   const special = Object.hasOwn(SPECIAL, name) ? SPECIAL[name] : undefined;
   const call = async (remote: Remote, args: unknown[]) =>
     special ? special(remote, ...(args as never[])) : post(sessionOf(remote), remote, name, args);
-  if (name === 'inSlices') return { value: asMethod((remote, [options]) => inSlices(remote, options as SliceOptions)) };
+  if (name === 'inSlices') {
+    const operations = SLICED[of as keyof typeof SLICED];
+    return { value: asMethod((remote, [options]) => inSlices(remote, operations, options as SliceOptions)) };
+  }
   if (kind === 'live') return { get: asMethod((remote) => remote.part(name)) };
   if (kind === 'value') return { get: asMethod((remote) => call(remote, [])) };
   return { value: asMethod(call) };

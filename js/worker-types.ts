@@ -81,14 +81,18 @@ type Members<T> = { [K in keyof T]: Member<T[K]> };
 
 /** The operations of `Mesh.inSlices` of a proxy. */
 export type MeshInSlices = Members<vesicle.MeshInSlices>;
+/** Those of `Volume.inSlices`. */
+export type VolumeInSlices = Members<vesicle.VolumeInSlices>;
 
 type Member<T> = [T] extends [LibraryObject]
   ? WithRemotes<T>
   : [T] extends [(...args: infer A) => vesicle.MeshInSlices]
     ? Method<A, MeshInSlices>
-    : [T] extends [(...args: infer A) => infer R]
-      ? Method<Arguments<A>, Promise<WithRemotes<Awaited<R>>>>
-      : Promise<WithRemotes<T>>;
+    : [T] extends [(...args: infer A) => vesicle.VolumeInSlices]
+      ? Method<A, VolumeInSlices>
+      : [T] extends [(...args: infer A) => infer R]
+        ? Method<Arguments<A>, Promise<WithRemotes<Awaited<R>>>>
+        : Promise<WithRemotes<T>>;
 
 /**
  * Proxy of an object in the worker: methods and properties return promises; live meshes are available synchronously.

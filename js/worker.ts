@@ -115,6 +115,8 @@ export type TrackingOptions = there.WithRemotes<vesicle.TrackingOptions>;
 
 /** Operations of a {@link Mesh} in the worker in slices of work, as in `vesicle`. */
 export type MeshInSlices = there.MeshInSlices;
+/** Those of a {@link Volume}. */
+export type VolumeInSlices = there.VolumeInSlices;
 
 export type Volume = there.Volume;
 export type Mesh = there.Mesh;

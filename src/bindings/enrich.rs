@@ -20,6 +20,15 @@ impl RawVolume {
     pub fn enrich_slices(&self, factor: Option<usize>, flow: bool) -> Result<RawVolume, JsValue> {
         Ok(RawVolume(self.0.enrich_slices(factor, method(flow)).map_err(Failure::from)?))
     }
+
+    /// Begins to do the same in slices of work.
+    #[wasm_bindgen(js_name = enrichInSlices)]
+    pub fn enrich_in_slices(&self, factor: Option<usize>, flow: bool) -> RawEnrichment {
+        let volume = self.0.clone();
+        RawEnrichment(Box::pin(async move {
+            volume.enrich_in_slices(factor, method(flow), &Pauses::default()).await
+        }))
+    }
 }
 
 /// A volume in which slices are being interpolated.
@@ -28,14 +37,6 @@ pub struct RawEnrichment(Pin<Box<dyn Future<Output = Result<Volume, VolumeError>
 
 #[wasm_bindgen]
 impl RawEnrichment {
-    /// Begins what `enrichSlices` of `volume` does.
-    #[wasm_bindgen(constructor)]
-    pub fn new(volume: &RawVolume, factor: Option<usize>, flow: bool) -> RawEnrichment {
-        let volume = volume.0.clone();
-        let enriched = async move { volume.enrich_in_slices(factor, method(flow), &Pauses::default()).await };
-        RawEnrichment(Box::pin(enriched))
-    }
-
     /// Does a slice of the work; returns the volume at the end, after which this must not be called any more.
     pub fn advance(&mut self) -> Result<Option<RawVolume>, JsValue> {
         match advance(&mut self.0) {

@@ -41,6 +41,22 @@ const bytesOfAll = (one: SurfaceTracker) =>
   Buffer.concat(Array.from(one.volumes(), (_, frame) => bytesOf(one.meshAt(frame))));
 const apart = (a: Vec3, b: Vec3) => Math.hypot(...a.map((x, k) => x - (b[k] as number)));
 
+test('a tracker is created with pauses, to the same bits, and that is aborted', async () => {
+  const made = await SurfaceTracker.create({ volume: short, params: { damping: 0.9 } }, { budgetMs: 1e-6 });
+  trackers.push(made);
+  const direct = tracker({ volume: short, params: { damping: 0.9 } });
+  expect([made.params, made.noise, made.save()]).toEqual([direct.params, direct.noise, direct.save()]);
+  made.step(1000);
+  direct.step(1000);
+  expect(bytesOfAll(made)).toEqual(bytesOfAll(direct));
+  const abort = new AbortController();
+  const work = SurfaceTracker.create({ volume: short }, { signal: abort.signal, budgetMs: 1e-6 });
+  abort.abort('enough');
+  await expect(work).rejects.toBe('enough');
+  await expect(SurfaceTracker.create({ volume: short, params: { radius: -1 } })).rejects.toThrow('radius');
+  expect(await rejection(SurfaceTracker.create(wrong({ volume: 1 })))).toMatchObject({ code: 'invalid-argument' });
+});
+
 test('the ball is tracked through its beat: valid surfaces of the right position and size', () => {
   const one = tracked({ params: { cyclic: true } });
   expect([one.frames, one.frame]).toEqual([FRAMES, FRAMES - 1]);

@@ -107,6 +107,27 @@ test('slices between thick ones follow motion from one to the next', () => {
   expect(thick.enrichSlices({ factor: 1 }).dims).toEqual(thick.dims);
 });
 
+test('slices are interpolated with pauses, to the same bits, and that is aborted', async () => {
+  const data = Uint8Array.from({ length: 64 * 64 * 3 * 2 }, (_, i) => (i * i) % 251);
+  const thick = new Volume({ data, dims: [64, 64, 3, 2], spacing: [1, 1, 3] });
+  let turns = 0;
+  const count = () => {
+    turns += 1;
+    immediate = setImmediate(count);
+  };
+  let immediate = setImmediate(count);
+  const short = { budgetMs: 1e-6 };
+  const found = await thick.inSlices(short).enrichSlices();
+  clearImmediate(immediate);
+  expect(turns).toBeGreaterThan(5);
+  expect([found.dims, found.frames, found.toNifti()]).toEqual([[64, 64, 7], 2, thick.enrichSlices().toNifti()]);
+  const abort = new AbortController();
+  const work = thick.inSlices({ ...short, signal: abort.signal }).enrichSlices({ factor: 2 });
+  abort.abort('enough');
+  await expect(work).rejects.toBe('enough');
+  await expect(thick.inSlices().enrichSlices(wrong({ factor: 0 }))).rejects.toThrow('factor');
+});
+
 test('binned voxels are means of blocks, in the right position, in all frames', () => {
   const placed = { spacing: [1, 2, 3], origin: [10, 20, 30], slope: 2, intercept: -1, frameSeconds: 0.5, space: 'LPS' };
   const volume = grid({ dims: [3, 2, 2, 2], ...placed });

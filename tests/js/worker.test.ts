@@ -171,7 +171,8 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
   },
   tracker: async ({ SurfaceTracker, Volume }) => {
     const frames = [7, 6.5, 6].map((radius) => new Volume({ data: ballOf(24, radius), dims: DIMS }));
-    const tracker = new SurfaceTracker({ volume: await Volume.fromFrames(frames), params: { window: 1 } });
+    const sequence = await (await Volume.fromFrames(frames)).inSlices().enrichSlices({ factor: 1 });
+    const tracker = await SurfaceTracker.create({ volume: sequence, params: { window: 1 } });
     const proposal = await SurfaceTracker.propose(await Volume.fromFrames(frames), {});
     const { phase } = await tracker.run();
     return [

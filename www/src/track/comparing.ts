@@ -1,9 +1,9 @@
 /** Repeats the whole tracking run with another setup, for the comparison panel of the Track lab. */
-import type { Volume } from 'vesicle';
+import { SurfaceTracker, type Volume } from 'vesicle';
 import type { CineSpec } from './cine';
 import { errorOf } from './frames';
 import type { ComparedTrack, Setup, SurfaceError } from './protocol';
-import { buildTracker, prepare } from './source';
+import { prepareInSlices, trackerOptions } from './source';
 
 type OnProgress = (part: number, phase: string) => void;
 
@@ -19,14 +19,16 @@ export async function trackForComparison(
   onProgress: OnProgress,
 ): Promise<ComparedTrack | undefined> {
   const began = performance.now();
-  const volume = prepare(original, setup.preparation, (what) => onProgress(0, what));
   try {
-    return await trackAll(volume, spec, setup, signal, onProgress, began);
+    const volume = await prepareInSlices(original, setup.preparation, (what) => onProgress(0, what), signal);
+    try {
+      return await trackAll(volume, spec, setup, signal, onProgress, began);
+    } finally {
+      if (volume !== original) volume.free();
+    }
   } catch (error) {
     if (signal.aborted) return undefined;
     throw error;
-  } finally {
-    if (volume !== original) volume.free();
   }
 }
 
@@ -38,8 +40,10 @@ async function trackAll(
   onProgress: OnProgress,
   began: number,
 ): Promise<ComparedTrack> {
-  const { tracker } = buildTracker(volume, setup);
+  const tracker = await SurfaceTracker.create({ volume, ...trackerOptions(volume, setup) }, { signal });
   try {
+    const { threshold } = setup.params;
+    if (threshold !== undefined) tracker.setParams({ threshold: threshold as number });
     await tracker.run({ signal, onStep: ({ progress, phase }) => onProgress(progress, phase) });
     const duration = performance.now() - began;
     const errors: SurfaceError[] = [];

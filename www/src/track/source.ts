@@ -47,27 +47,44 @@ async function fromParts(parts: NamedBytes[][]): Promise<Volume> {
  * nothing to do. `onStage` receives each step in words, for the status line.
  */
 export function prepare(image: Volume, preparation: Preparation, onStage: (what: string) => void): Volume {
-  const { binning, enrichment, factor } = preparation;
-  let present = image;
-  const take = (next: Volume) => {
-    if (present !== image) present.free();
-    present = next;
-  };
+  const binned = binnedBy(image, preparation, onStage);
+  if (!enriches(preparation)) return binned;
   try {
-    if (binning > 1) {
-      onStage(text('track.binning'));
-      take(present.binned(factorsOf(present, binning)));
-    }
-    if (enrichment !== 'none' && factor !== 1) {
-      const key = enrichment === 'flow' ? 'track.enrichingFlow' : 'track.enrichingLinear';
-      onStage(text(key, { frames: present.frames }));
-      take(present.enrichSlices({ method: enrichment, ...(factor > 0 && { factor }) }));
-    }
-    return present;
-  } catch (error) {
-    if (present !== image) present.free();
-    throw error;
+    return binned.enrichSlices(enrichmentOf(binned, preparation, onStage));
+  } finally {
+    if (binned !== image) binned.free();
   }
+}
+
+/** As {@link prepare}, with pauses; rejects with the signal's reason when it aborts. */
+export async function prepareInSlices(
+  image: Volume,
+  preparation: Preparation,
+  onStage: (what: string) => void,
+  signal: AbortSignal,
+): Promise<Volume> {
+  const binned = binnedBy(image, preparation, onStage);
+  if (!enriches(preparation)) return binned;
+  try {
+    return await binned.inSlices({ signal }).enrichSlices(enrichmentOf(binned, preparation, onStage));
+  } finally {
+    if (binned !== image) binned.free();
+  }
+}
+
+function binnedBy(image: Volume, { binning }: Preparation, onStage: (what: string) => void): Volume {
+  if (binning <= 1) return image;
+  onStage(text('track.binning'));
+  return image.binned(factorsOf(image, binning));
+}
+
+const enriches = ({ enrichment, factor }: Preparation) => enrichment !== 'none' && factor !== 1;
+
+/** Returns the options of the interpolation of slices, once the user knows of it. */
+function enrichmentOf({ frames }: Volume, { enrichment, factor }: Preparation, onStage: (what: string) => void) {
+  onStage(text(enrichment === 'flow' ? 'track.enrichingFlow' : 'track.enrichingLinear', { frames }));
+  const method = enrichment === 'flow' ? ('flow' as const) : ('linear' as const);
+  return { method, ...(factor > 0 && { factor }) };
 }
 
 /**
@@ -109,9 +126,9 @@ export function buildTracker(
   setup: Setup,
   state?: Uint8Array,
 ): { tracker: SurfaceTracker; suggested: number } {
-  const { threshold } = setup.params;
   const tracker = new SurfaceTracker({ volume, ...trackerOptions(volume, setup) });
   try {
+    const { threshold } = setup.params;
     const suggested = tracker.params.threshold;
     if (threshold !== undefined) tracker.setParams({ threshold: threshold as number });
     if (state) tracker.restore(state);
