@@ -51,6 +51,17 @@ const VOLUME_ERROR: f64 = 1e-6;
 /// The largest number of moves after the last iteration that correct the volume.
 const CORRECTIONS: usize = 8;
 
+/// The number of vertices up to which, and the share of all (one of so many), those that have to be held back are repaired
+/// where they are; with more, all is smoothed again under the guard.
+const MOST_HELD: usize = 12;
+const MOST_HELD_SHARE: usize = 30;
+
+/// The number of rings around vertices that were held back which are smoothed again with them.
+const RINGS: usize = 2;
+
+/// The largest number of iterations of that.
+const AGAIN: usize = 10;
+
 /// The length by which the ordinary edge of collision handling exceeds the mean edge, as a factor.
 const ORDINARY_EDGE: f64 = 1.5;
 
@@ -81,9 +92,10 @@ pub fn smooth(mesh: &mut Mesh, smoothing: Smoothing) -> Result<(), MeshError> {
     let mut smoother = Smoother::new(mesh, keeps_volume);
     smoother.run(mesh, iterations);
     let ordinary_edge = (edge * f64::from(shrink) * ORDINARY_EDGE) as f32;
-    if !embedding_of(mesh, ordinary_edge).is_embedded(mesh) {
-        mesh.positions_mut().copy_from_slice(&before);
-        smoother.guard = Some(embedding_of(mesh, ordinary_edge));
+    let smoothed = mesh.positions().to_vec();
+    mesh.positions_mut().copy_from_slice(&before);
+    smoother.guard = Some(embedding_of(mesh, ordinary_edge));
+    if !smoother.move_to(mesh, &smoothed, iterations) {
         smoother.run(mesh, iterations);
     }
     mesh.positions_mut().iter_mut().for_each(|p| *p *= grow);
@@ -148,6 +160,37 @@ impl Smoother {
         }
         (0..BALANCES).for_each(|_| self.balance(mesh));
         self.correct_volumes(mesh);
+    }
+
+    /// Moves all vertices to where they were smoothed, except where triangles would intersect: vertices there are held
+    /// back, and smoothed again under the guard. Returns false, with nothing moved, if these are too many.
+    fn move_to(&mut self, mesh: &mut Mesh, smoothed: &[Vec3], iterations: usize) -> bool {
+        let Some(guard) = &mut self.guard else { return false };
+        let most = MOST_HELD.max(mesh.vertex_count() / MOST_HELD_SHARE);
+        let Some(held) = guard.move_to_unless(mesh, smoothed, most) else { return false };
+        if held.is_empty() {
+            return true;
+        }
+        let mut around: Vec<VertexId> = held.into_iter().map(|(v, _)| v).collect();
+        (0..RINGS).for_each(|_| mesh.add_neighbours(&mut around));
+        around.sort_unstable();
+        for _ in 0..iterations.min(AGAIN) {
+            self.step_some(mesh, &around, SHRINK);
+            self.step_some(mesh, &around, -GROW);
+        }
+        self.correct_volumes(mesh);
+        true
+    }
+
+    /// Moves some vertices, sorted by id, as [`Self::step`] does.
+    fn step_some(&mut self, mesh: &mut Mesh, moving: &[VertexId], factor: f32) {
+        for &v in moving {
+            let to_mean = mesh.ring(v).mean(mesh.positions()) - mesh.position(v);
+            self.displacements[v.index()] = to_mean * factor;
+        }
+        if let Some(guard) = &mut self.guard {
+            guard.move_some(mesh, moving, &mut self.displacements);
+        }
     }
 
     /// Gives volume back where it was lost, if it is to be kept.
