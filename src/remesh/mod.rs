@@ -40,4 +40,4 @@ pub use restructure::{
     restructure, restructure_in_passes, restructure_in_slices, split_long,
 };
 pub use sampling::Sampling;
-pub use smooth::{Smoothing, smooth};
+pub use smooth::{Smoothing, smooth, smooth_in_slices};

@@ -73,6 +73,35 @@ impl Embedding {
         let from: Vec<Vec3> = moving.iter().map(|&v| mesh.position(v)).collect();
         let positions = mesh.positions_mut();
         moving.iter().map(|v| v.index()).for_each(|i| positions[i] += displacements[i]);
+        self.hold_back(mesh, moving, &from, displacements, most)
+    }
+
+    /// Moves all vertices to `targets`, given by slot, as [`Self::move_some_unless`] does: those that are not held back are
+    /// there exactly.
+    pub fn move_to_unless(
+        &mut self,
+        mesh: &mut Mesh,
+        targets: &[Vec3],
+        most: usize,
+    ) -> Option<Vec<(VertexId, f32)>> {
+        self.sync_without_cells(mesh);
+        let moving: Vec<VertexId> = mesh.vertices().collect();
+        let from: Vec<Vec3> = moving.iter().map(|&v| mesh.position(v)).collect();
+        let mut displacements: Vec<Vec3> =
+            targets.iter().zip(mesh.positions()).map(|(target, from)| *target - *from).collect();
+        mesh.positions_mut().copy_from_slice(targets);
+        self.hold_back(mesh, &moving, &from, &mut displacements, most)
+    }
+
+    /// Holds back vertices that were moved by `displacements`, as [`Self::move_some_unless`] does.
+    fn hold_back(
+        &mut self,
+        mesh: &mut Mesh,
+        moving: &[VertexId],
+        from: &[Vec3],
+        displacements: &mut [Vec3],
+        most: usize,
+    ) -> Option<Vec<(VertexId, f32)>> {
         self.resize_for_checks(mesh);
         self.mark_edited_dirty(mesh);
         self.apply_motion(mesh, moving.iter().copied().zip(from.iter().copied()));
@@ -91,7 +120,7 @@ impl Embedding {
                 break;
             }
             if held.len() > most {
-                self.move_back(mesh, moving, &from);
+                self.move_back(mesh, moving, from);
                 return None;
             }
             let before: Vec<Vec3> = held.iter().map(|&(v, _)| mesh.position(v)).collect();
