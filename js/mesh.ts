@@ -199,6 +199,8 @@ export interface MeshInSlices {
   decimate(targetTriangles: number): Promise<void>;
   /** As {@link Mesh.decimateWithin}. */
   decimateWithin(maxDistance: number, options?: { targetTriangles?: number }): Promise<void>;
+  /** As {@link Mesh.smooth}. */
+  smooth(options: { iterations: number; keepVolume?: boolean }): Promise<void>;
   /** As {@link Mesh.distanceTo}, for the two surfaces as they are when it is called. */
   distanceTo(other: Mesh): Promise<SurfaceDistance>;
 }
@@ -583,10 +585,7 @@ export class Mesh {
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first.
    */
   smooth(options: { iterations: number; keepVolume?: boolean }): void {
-    const copy = checkProperties('options', shallowCopy('options', options), ['iterations', 'keepVolume']);
-    const { iterations, keepVolume = true } = copy;
-    const count = integer('iterations', iterations, { max: 10_000 });
-    if (typeof keepVolume !== 'boolean') throw invalid('keepVolume', 'must be true or false');
+    const [count, keepVolume] = smoothing(options);
     this.#edit('smooth', (raw) => raw.smooth(count, keepVolume));
   }
 
@@ -857,6 +856,10 @@ export class Mesh {
         const [target, distance] = decimationBounds(maxDistance, within);
         return change('decimateWithin', (raw) => raw.decimateWithinInSlices(target, distance));
       },
+      smooth: async (options) => {
+        const [count, keepVolume] = smoothing(options);
+        return change('smooth', (raw) => raw.smoothInSlices(count, keepVolume));
+      },
       distanceTo: async (other) => {
         const handle = meshHandle('other', other);
         return this.#work((raw) => handle.use((rawOther) => raw.distanceToInSlices(rawOther)), slices);
@@ -935,6 +938,15 @@ function triple(numbers: Float64Array): Vec3 {
 function passCodes(passes: readonly RestructurePass[]): Uint8Array {
   const code = (pass: RestructurePass) => RESTRUCTURE_PASSES.indexOf(choice('passes', pass, RESTRUCTURE_PASSES));
   return Uint8Array.from(denseCopy('passes', passes).map(code));
+}
+
+/** Returns the options of {@link Mesh.smooth} once they are checked. */
+function smoothing(options: { iterations: number; keepVolume?: boolean }): [number, boolean] {
+  const copy = checkProperties('options', shallowCopy('options', options), ['iterations', 'keepVolume']);
+  const { iterations, keepVolume = true } = copy;
+  const count = integer('iterations', iterations, { max: 10_000 });
+  if (typeof keepVolume !== 'boolean') throw invalid('keepVolume', 'must be true or false');
+  return [count, keepVolume];
 }
 
 /** Returns the target and the largest distance of {@link Mesh.decimateWithin} once they are checked. */

@@ -217,6 +217,7 @@ export const SLICED: { Mesh: Names<keyof MeshInSlices>; Volume: Names<keyof Volu
     restructure: 'method',
     decimate: 'method',
     decimateWithin: 'method',
+    smooth: 'method',
     distanceTo: 'method',
   },
   Volume: { enrichSlices: 'method' },

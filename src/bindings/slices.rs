@@ -12,7 +12,10 @@ use super::error::Failure;
 use super::mesh::{MeshKind, RawMesh, distances, edge_bounds, editable_copy, passes_of, read_only};
 use vesicle::mesh::Mesh;
 use vesicle::pauses::{Pauses, advance};
-use vesicle::remesh::{decimate_in_slices, decimate_within_in_slices, passes_in_slices, remesh_in_slices};
+use vesicle::remesh::{
+    Smoothing, decimate_in_slices, decimate_within_in_slices, passes_in_slices, remesh_in_slices,
+    smooth_in_slices,
+};
 use vesicle::spatial::surface_distance_in_slices;
 
 /// The results of an operation: the changed mesh, if it is changed, and the value that is returned.
@@ -139,6 +142,16 @@ impl RawMesh {
         self.decimate_by(target_triangles, async move |mesh, target, pauses| {
             decimate_within_in_slices(mesh, target, max_distance, pauses).await?;
             Ok(())
+        })
+    }
+
+    /// Begins what `smooth` does.
+    #[wasm_bindgen(js_name = smoothInSlices)]
+    pub fn smooth_in_slices(&self, iterations: usize, keep_volume: bool) -> Result<RawMeshWork, JsValue> {
+        let smoothing = Smoothing { iterations, keeps_volume: keep_volume };
+        self.change(async move |mesh, pauses| {
+            smooth_in_slices(mesh, smoothing, pauses).await?;
+            Ok(JsValue::UNDEFINED)
         })
     }
 

@@ -199,19 +199,19 @@ impl Smoother {
     async fn run(&mut self, mesh: &mut Mesh, iterations: usize, pauses: &Pauses) {
         let all: Vec<VertexId> = mesh.vertices().collect();
         for i in 1..=iterations {
-            self.step(mesh, &all, SHRINK);
-            self.step(mesh, &all, -GROW);
+            self.step(mesh, &all, SHRINK, pauses).await;
+            self.step(mesh, &all, -GROW, pauses).await;
             pauses.after(all.len() / PER_UNIT).await;
             if i % BETWEEN == 0 {
-                self.balance(mesh, &all);
+                self.balance(mesh, &all, pauses).await;
                 pauses.after(all.len() / PER_UNIT).await;
             }
         }
         for _ in 0..BALANCES {
-            self.balance(mesh, &all);
+            self.balance(mesh, &all, pauses).await;
             pauses.after(all.len() / PER_UNIT).await;
         }
-        self.correct_volumes(mesh);
+        self.correct_volumes(mesh, pauses).await;
     }
 
     /// Moves all vertices to where they were smoothed, except where triangles would intersect: vertices there are held
@@ -225,32 +225,32 @@ impl Smoother {
     ) -> bool {
         let Some(guard) = &mut self.guard else { return false };
         let most = MOST_HELD.max(mesh.vertex_count() / VERTICES_PER_HELD);
-        let Some(held) = guard.move_to_unless(mesh, smoothed, most) else { return false };
+        let Some(held) = guard.move_to_unless(mesh, smoothed, most, pauses).await else { return false };
         if held.is_empty() {
             return true;
         }
         let mut around: Vec<VertexId> = held.into_iter().map(|(v, _)| v).collect();
         (0..RINGS).for_each(|_| mesh.add_neighbours(&mut around));
         for _ in 0..iterations.min(AGAIN) {
-            self.step(mesh, &around, SHRINK);
-            self.step(mesh, &around, -GROW);
+            self.step(mesh, &around, SHRINK, pauses).await;
+            self.step(mesh, &around, -GROW, pauses).await;
             pauses.after(around.len()).await;
         }
-        self.correct_volumes(mesh);
+        self.correct_volumes(mesh, pauses).await;
         true
     }
 
     /// Gives volume back where it was lost, if it is to be kept.
-    fn balance(&mut self, mesh: &mut Mesh, all: &[VertexId]) {
+    async fn balance(&mut self, mesh: &mut Mesh, all: &[VertexId], pauses: &Pauses) {
         let Some(balance) = &mut self.balance else { return };
         balance.displacements(mesh.positions(), MAX_OFFSET as f32, &mut self.displacements);
-        self.apply(mesh, all);
+        self.apply(mesh, all, pauses).await;
     }
 
     /// Moves vertices, sorted by id, by their displacements, as far as the guard permits.
-    fn apply(&mut self, mesh: &mut Mesh, moving: &[VertexId]) {
+    async fn apply(&mut self, mesh: &mut Mesh, moving: &[VertexId], pauses: &Pauses) {
         if let Some(guard) = &mut self.guard {
-            guard.move_some(mesh, moving, &mut self.displacements);
+            guard.move_some_in_slices(mesh, moving, &mut self.displacements, pauses).await;
             return;
         }
         let positions = mesh.positions_mut();
@@ -258,16 +258,16 @@ impl Smoother {
     }
 
     /// Moves vertices, sorted by id, by `factor` of the way to the mean of their neighbours.
-    fn step(&mut self, mesh: &mut Mesh, moving: &[VertexId], factor: f32) {
+    async fn step(&mut self, mesh: &mut Mesh, moving: &[VertexId], factor: f32, pauses: &Pauses) {
         for &v in moving {
             let to_mean = mesh.ring(v).mean(mesh.positions()) - mesh.position(v);
             self.displacements[v.index()] = to_mean * factor;
         }
-        self.apply(mesh, moving);
+        self.apply(mesh, moving, pauses).await;
     }
 
     /// Restores the volumes after the last iteration, up to rounding.
-    fn correct_volumes(&mut self, mesh: &mut Mesh) {
+    async fn correct_volumes(&mut self, mesh: &mut Mesh, pauses: &Pauses) {
         let mut differing: Vec<usize> = (0..self.components.len()).collect();
         for _ in 0..CORRECTIONS {
             let mut moving = Vec::new();
@@ -284,7 +284,7 @@ impl Smoother {
                 return;
             }
             moving.sort_unstable();
-            self.apply(mesh, &moving);
+            self.apply(mesh, &moving, pauses).await;
         }
     }
 }
@@ -414,7 +414,8 @@ mod tests {
         finished(smoother.run(&mut smoothed, smoothing.iterations, &Pauses::default()));
         let mut guard = embedding_of(mesh, mean_edge(mesh) as f32 * 1.5);
         let most = MOST_HELD.max(mesh.vertex_count() / VERTICES_PER_HELD);
-        let held = guard.move_to_unless(&mut mesh.clone(), smoothed.positions(), most);
+        let held =
+            finished(guard.move_to_unless(&mut mesh.clone(), smoothed.positions(), most, &Pauses::default()));
         (smoothed, held.map(|held| held.into_iter().map(|(v, _)| v).collect()))
     }
 

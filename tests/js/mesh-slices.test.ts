@@ -21,6 +21,7 @@ const OPERATIONS: Record<keyof MeshInSlices, (mesh: Mesh | MeshInSlices) => unkn
   restructure: (mesh) => mesh.restructure(EDGE, ['split', 'flip', 'collapse', 'flip']),
   decimate: (mesh) => mesh.decimate(1000.5),
   decimateWithin: (mesh) => mesh.decimateWithin(0.01, { targetTriangles: 500 }),
+  smooth: (mesh) => mesh.smooth({ iterations: 3 }),
   distanceTo: (mesh) => mesh.distanceTo(OTHER),
 };
 

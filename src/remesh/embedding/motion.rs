@@ -73,16 +73,17 @@ impl Embedding {
         let from: Vec<Vec3> = moving.iter().map(|&v| mesh.position(v)).collect();
         let positions = mesh.positions_mut();
         moving.iter().map(|v| v.index()).for_each(|i| positions[i] += displacements[i]);
-        self.hold_back(mesh, moving, &from, displacements, most)
+        self.hold_back(mesh, moving, &from, displacements, most, pauses).await
     }
 
     /// Moves all vertices to `targets`, given by slot, as [`Self::move_some_unless`] does: those that are not held back are
     /// there exactly.
-    pub fn move_to_unless(
+    pub async fn move_to_unless(
         &mut self,
         mesh: &mut Mesh,
         targets: &[Vec3],
         most: usize,
+        pauses: &Pauses,
     ) -> Option<Vec<(VertexId, f32)>> {
         self.sync_without_cells(mesh);
         let moving: Vec<VertexId> = mesh.vertices().collect();
@@ -90,17 +91,18 @@ impl Embedding {
         let mut displacements: Vec<Vec3> =
             targets.iter().zip(mesh.positions()).map(|(target, from)| *target - *from).collect();
         mesh.positions_mut().copy_from_slice(targets);
-        self.hold_back(mesh, &moving, &from, &mut displacements, most)
+        self.hold_back(mesh, &moving, &from, &mut displacements, most, pauses).await
     }
 
     /// Holds back vertices that were moved by `displacements`, as [`Self::move_some_unless`] does.
-    fn hold_back(
+    async fn hold_back(
         &mut self,
         mesh: &mut Mesh,
         moving: &[VertexId],
         from: &[Vec3],
         displacements: &mut [Vec3],
         most: usize,
+        pauses: &Pauses,
     ) -> Option<Vec<(VertexId, f32)>> {
         self.resize_for_checks(mesh);
         self.mark_edited_dirty(mesh);
