@@ -99,7 +99,7 @@ mod tests {
     fn outdated_items_are_dropped_while_they_wait() {
         let mut queue = CollapseQueue::new();
         (0..10_000).for_each(|k| queue.push((u64::from(k) + 1, k)));
-        let is_even = |item: &(u64, u32)| item.1 % 2 == 0;
+        let is_even = |item: &(u64, u32)| item.1.is_multiple_of(2);
         let popped = (0..).map_while(|_: u32| queue.pop(is_even)).collect::<Vec<_>>();
         assert_eq!(popped, (0..10_000).step_by(2).map(|k| (u64::from(k) + 1, k)).collect::<Vec<_>>());
     }
