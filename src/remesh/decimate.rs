@@ -6,6 +6,7 @@
 //! this is tested before each collapse, intersections exactly. [`decimate_within`] bounds the distance between the mesh
 //! before and after, too.
 
+use super::collapse_queue::{CollapseQueue, Ranked};
 use super::deviation::Deviation;
 use super::obstacles::Obstacles;
 use crate::math::predicates::collinear;
@@ -13,8 +14,6 @@ use crate::math::{DVec3, Quadric, Vec3, triangle};
 use crate::mesh::{Facet, Mesh, MeshError, VertexId};
 use crate::pauses::{Pauses, finished};
 use smallvec::SmallVec;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
 /// The weight of the squared distance from the original vertices, relative to that from the planes of the triangles. It
 /// regularises flat regions, where the position of least error is undetermined and needles would develop; with 0.01,
@@ -164,7 +163,7 @@ struct Decimation<'a> {
     origin: DVec3,
     /// The number of collapses at each vertex, by slot, by which outdated candidates in the queue are recognised.
     stamps: Vec<u32>,
-    queue: BinaryHeap<Reverse<Candidate>>,
+    queue: CollapseQueue<Candidate>,
     obstacles: Obstacles,
     /// A further condition of collapses.
     condition: Box<dyn Condition>,
@@ -183,6 +182,12 @@ struct Candidate {
     stamp: u32,
 }
 
+impl Ranked for Candidate {
+    fn rank(&self) -> u64 {
+        self.error
+    }
+}
+
 /// A candidate position for the vertex that remains after a collapse, preceded by its quadric error.
 type RatedPosition = (f64, Vec3);
 
@@ -197,7 +202,7 @@ impl<'a> Decimation<'a> {
             quadrics,
             origin,
             stamps: vec![0; mesh.slots()],
-            queue: BinaryHeap::new(),
+            queue: CollapseQueue::new(),
             obstacles: Obstacles::in_slices(mesh, work, pauses).await,
             condition,
             mesh,
@@ -220,9 +225,11 @@ impl<'a> Decimation<'a> {
     async fn run(&mut self, pauses: &Pauses) {
         let mut before = self.tests();
         while !self.is_done() {
-            let Some(Reverse(candidate)) = self.queue.pop() else { return };
+            let stamps = &self.stamps;
+            let is_current = |c: &Candidate| c.stamp == c.ends.iter().map(|v| stamps[v.index()]).sum::<u32>();
+            let Some(candidate) = self.queue.pop(is_current) else { return };
             let [u, v] = candidate.ends;
-            if candidate.stamp == self.stamp(u, v) {
+            if is_current(&candidate) {
                 self.attempt(u, v, candidate.choice);
                 let tests = self.tests();
                 pauses.after(ATTEMPT + (tests - before) as usize / TESTS_PER_UNIT).await;
@@ -265,7 +272,7 @@ impl<'a> Decimation<'a> {
     fn enqueue(&mut self, u: VertexId, v: VertexId, choice: u8) {
         if let Some(&(error, _)) = self.positions(u, v).get(choice as usize) {
             let stamp = self.stamp(u, v);
-            self.queue.push(Reverse(Candidate { error: error.to_bits(), ends: [u, v], choice, stamp }));
+            self.queue.push(Candidate { error: error.to_bits(), ends: [u, v], choice, stamp });
         }
     }
 

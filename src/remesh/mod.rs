@@ -11,6 +11,7 @@
 
 mod changes;
 mod clustering;
+mod collapse_queue;
 mod contact;
 mod decimate;
 mod deviation;

@@ -440,11 +440,12 @@ mod tests {
         let balls = |p: DVec3| (14.0 - p.length()).max(3.0 - (p - DVec3::splat(17.0)).length());
         // About as thick as the noise.
         let plate = |p: DVec3| 1.0 - p.z.abs();
+        let plates = |p: DVec3| plate(p - DVec3::Z * 7.0 * (p.z / 7.0).round().clamp(-1.0, 1.0));
         let shapes = [
             (with_noise(0, 1.3, balls), 2),
             (with_noise(2, 1.3, balls), 2),
             (with_noise(3, 0.9, plate), 1),
-            (with_noise(5, 0.9, plate), 1),
+            (with_noise(5, 0.9, plates), 1),
         ];
         for (k, (rough, components)) in shapes.into_iter().enumerate() {
             assert_eq!(count_self_intersections(&rough.to_triangles()), 0);
