@@ -837,6 +837,8 @@ export class Mesh {
    */
   inSlices(options?: SliceOptions): MeshInSlices {
     const slices = checkedSlices(options);
+    // Throws if the mesh was freed.
+    this.#handle.use(() => undefined);
     const change = <T>(what: string, begin: (raw: RawMesh) => RawMeshWork) => this.#change<T>(what, begin, slices);
     return {
       remesh: async (edge) => {
