@@ -14,7 +14,7 @@ use crate::remesh::{Changes, Pending, Resolver};
 
 /// The work, in units per vertex, after which the state is copied again. With less, copies take a larger share of the time;
 /// with more, steps that are made again take longer.
-const WORK_PER_VERTEX: f64 = 1.5;
+const WORK_PER_VERTEX: f64 = 3.0;
 
 /// The least work, in units, after which the state is copied again: about ten milliseconds.
 const LEAST_WORK: u64 = 4000;
