@@ -28,6 +28,8 @@ pub struct Cell {
     pub offset: Vec3,
     /// Number of surfaces that pass through the cell, if each does so once and they are one or two, else 0.
     pub simple: u8,
+    /// Whether no label has more than one vertex in the cell.
+    pub is_single: bool,
     /// Whether two labels meet in the cell like in a saddle: at some edge between them, their vertices do not move apart
     /// along the edge, since they do so the other way at another edge.
     pub is_saddle: bool,
@@ -39,7 +41,7 @@ impl Cell {
     /// Creates a cell with its vertices in the middle.
     pub fn new(at: [u32; 3], corners: [u16; 8]) -> Self {
         let mut cell =
-            Self { at, corners, offset: Vec3::ZERO, simple: 0, is_saddle: false, has_diagonal: false };
+            Self { at, corners, offset: Vec3::ZERO, simple: 0, is_single: true, is_saddle: false, has_diagonal: false };
         cell.set_corners(corners);
         cell
     }
@@ -49,6 +51,7 @@ impl Cell {
         let counts = self.numbers().map(|number| self.vertices_of(number));
         let (surfaces, most) = counts.fold((0, 0), |(surfaces, most), count| (surfaces + 1, count.max(most)));
         self.simple = if surfaces <= 2 && most == 1 { surfaces } else { 0 };
+        self.is_single = most <= 1;
         self.is_saddle = surfaces >= 2 && self.has_edge_without_gap();
         self.has_diagonal =
             (0..3).any(|axis| [false, true].iter().any(|&far| self.has_diagonal_on(axis, far)));

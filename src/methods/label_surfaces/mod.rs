@@ -15,6 +15,7 @@ mod coarsen;
 mod components;
 mod counts;
 mod cube_loops;
+mod envelope;
 mod extract;
 mod label_grid;
 mod nets;
@@ -161,7 +162,6 @@ impl LabelSurfaces {
         let cells = surfaces.nets.cells.slots().len();
         surfaces.recount(&pauses).await;
         pauses.after(cells).await;
-        surfaces.nets.untangle(everywhere, &pauses).await;
         surfaces.wake(everywhere);
         pauses.after(cells).await;
         surfaces.coarsen(everywhere, &[], &mut [], &pauses).await;
@@ -242,7 +242,7 @@ impl LabelSurfaces {
         }
         finished(self.count(&touched, Counts::add, &pauses));
         finished(self.components.update(&self.nets.cells, &changed, &pauses));
-        let untangle = async |nets: &mut Nets| nets.untangle(touched, &pauses).await;
+        let untangle = async |nets: &mut Nets| nets.untangle(touched, None, &pauses).await;
         let untangled = if updated.is_ok() { finished(untangle(&mut self.nets)) } else { Vec::new() };
         let area = changed.grown(HALO, dims);
         self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
@@ -362,7 +362,7 @@ impl LabelSurfaces {
             let start = self.note("volumes", &mut times, start);
             let area = zone.area.grown(1, self.nets.grid.dims());
             let [mut moved, mut reconnected] = [(); 2].map(|()| self.nets.no_labels());
-            let untangled = self.nets.untangle(area, &pauses).await;
+            let untangled = self.nets.untangle(area, Some(&mut zone), &pauses).await;
             zone.read(&self.nets);
             self.nets.flag_labels_in(zone.moved_from(&offsets), &mut moved);
             zone.flag_reconnected(&diagonals, &mut reconnected);

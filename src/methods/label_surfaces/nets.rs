@@ -70,7 +70,7 @@ pub struct Crossing {
 }
 
 /// Position, along the two axes after that of the edge, of the four cells around it: 0 before it, 1 after.
-const AROUND: [[usize; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
+pub const AROUND: [[usize; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
 
 /// The polygon of one label around an edge of the grid, as triangles.
 #[derive(Clone, Copy, Debug)]

@@ -8,6 +8,7 @@ use super::cells::CellBox;
 use super::cube_loops::corner_offset;
 use super::label_grid::BACKGROUND;
 use super::nets::{Crossing, NetVertex, Nets};
+use super::zone::Zone;
 use crate::math::Vec3;
 use crate::math::order::sort_distinct;
 use crate::mesh::{Facet, facets_intersect};
@@ -23,6 +24,9 @@ const HALVINGS: u32 = 3;
 const NEEDLE: f32 = 1e-3;
 /// Units of work of the test of a cell.
 const WORK_OF_CELL: usize = 8;
+/// Number of polygons that are tested by themselves at once, and units of work of that.
+const POLYGONS: usize = 256;
+const WORK_OF_POLYGONS: usize = 20;
 /// Distance, in voxels, by which positions may differ between index space and world space in single precision, with
 /// room to spare.
 const MARGIN: f32 = 1e-3;
@@ -72,29 +76,51 @@ struct Neighbourhood {
     positions: Vec<Vec3>,
 }
 
+/// For the cells in all slots, which pairs of polygons are to be tested.
+struct Search {
+    /// Whether surfaces may intersect in the cell.
+    in_doubt: Vec<bool>,
+    /// Whether pairs of which it is the first common cell are tested.
+    is_wanted: Vec<bool>,
+    /// Whether each polygon of the zone surely intersects no other.
+    is_clear: Vec<bool>,
+}
+
 impl Nets {
-    /// Moves cells towards their middle until no surfaces intersect in and around the cells of a box. Returns the slots of
-    /// the cells moved.
-    pub async fn untangle(&mut self, area: CellBox, pauses: &Pauses) -> Vec<u32> {
+    /// Moves cells towards their middle until no surfaces intersect in and around the cells of a box, those of a zone that
+    /// has their positions and those around it, or any others. Returns the slots of the cells moved.
+    pub async fn untangle(&mut self, area: CellBox, mut zone: Option<&mut Zone>, pauses: &Pauses) -> Vec<u32> {
         let mut halved: BTreeMap<u32, u32> = BTreeMap::new();
+        let mut search = Search::new(self, zone.as_deref(), pauses).await;
         let mut to_test = self.cells.within(&area);
+        let mut candidates = self.cells.within(&area.grown(1, self.grid.dims()));
         let mut neighbourhood = Neighbourhood::default();
         while !to_test.is_empty() {
+            to_test.iter().for_each(|&slot| search.is_wanted[slot as usize] = true);
             let mut tangled = Vec::new();
-            for &slot in &to_test {
+            candidates.retain(|&slot| search.in_doubt[slot as usize]);
+            if std::env::var("STATS").is_ok() { eprintln!("to_test {} candidates {} polygons clear {}/{}", to_test.len(), candidates.len(), search.is_clear.iter().filter(|&&x| x).count(), search.is_clear.len()); }
+            for &slot in &candidates {
                 neighbourhood.fill(self, slot);
-                neighbourhood.find_intersections(self, &mut tangled);
+                neighbourhood.find_intersections(self, &search, &mut tangled);
                 pauses.after(WORK_OF_CELL).await;
             }
+            to_test.iter().for_each(|&slot| search.is_wanted[slot as usize] = false);
             sort_distinct(&mut tangled);
             tangled.retain(|slot| halved.get(slot).is_none_or(|&times| times <= HALVINGS));
+            if std::env::var("STATS").is_ok() { eprintln!("  tangled {}", tangled.len()); }
             for &slot in &tangled {
                 let times = halved.entry(slot).or_default();
                 *times += 1;
                 let factor = if *times <= HALVINGS { 0.5 } else { 0.0 };
                 *self.cells.offset_mut(slot) *= factor;
             }
+            if let Some(zone) = &mut zone {
+                zone.read(self);
+                search.update(self, zone, &tangled, pauses).await;
+            }
             to_test = self.with_neighbours(&tangled);
+            candidates = self.with_neighbours(&to_test);
         }
         halved.into_keys().collect()
     }
@@ -109,6 +135,52 @@ impl Nets {
         }
         sort_distinct(&mut found);
         found
+    }
+}
+
+impl Search {
+    /// Tests the polygons of a zone; outside of it, and without one, surfaces may intersect in all cells.
+    async fn new(nets: &Nets, zone: Option<&Zone>, pauses: &Pauses) -> Self {
+        let slots = nets.cells.slots().len();
+        let mut search = Self { in_doubt: vec![true; slots], is_wanted: vec![false; slots], is_clear: Vec::new() };
+        if let Some(zone) = zone {
+            for polygons in zone.polygons.chunks(POLYGONS) {
+                search.is_clear.extend(polygons.iter().map(|polygon| zone.is_clear(nets, polygon)));
+                pauses.after(WORK_OF_POLYGONS).await;
+            }
+            search.spread(zone);
+        }
+        search
+    }
+
+    /// Tests the polygons around cells in given slots again, which have moved.
+    async fn update(&mut self, nets: &Nets, zone: &Zone, slots: &[u32], pauses: &Pauses) {
+        let mut has_moved = vec![false; self.in_doubt.len()];
+        slots.iter().for_each(|&slot| has_moved[slot as usize] = true);
+        let has_moved: Vec<bool> = zone.slots.iter().map(|&slot| has_moved[slot as usize]).collect();
+        for (is_clear, polygon) in self.is_clear.iter_mut().zip(&zone.polygons) {
+            if polygon.cells.iter().any(|&i| has_moved[i as usize]) {
+                *is_clear = zone.is_clear(nets, polygon);
+            }
+        }
+        pauses.after(zone.polygons.len() / POLYGONS).await;
+        self.spread(zone);
+    }
+
+    /// Notes in which cells of a zone surfaces may intersect: those of polygons that may.
+    fn spread(&mut self, zone: &Zone) {
+        zone.slots[..zone.moving()].iter().for_each(|&slot| self.in_doubt[slot as usize] = false);
+        for (_, polygon) in self.is_clear.iter().zip(&zone.polygons).filter(|&(&is_clear, _)| !is_clear) {
+            polygon.cells.iter().for_each(|&i| self.in_doubt[zone.slots[i as usize] as usize] = true);
+        }
+    }
+
+    /// Returns whether a pair of polygons, given by the cells around the edge of each, is tested in the cell in a slot: in
+    /// the first one that both have in common and in which surfaces may intersect.
+    fn is_tested_in(&self, slot: u32, one: &[u32; 4], other: &[u32; 4]) -> bool {
+        let common = || one.iter().copied().filter(|slot| other.contains(slot));
+        common().min().is_some_and(|first| self.is_wanted[first as usize])
+            && common().filter(|&slot| self.in_doubt[slot as usize]).min() == Some(slot)
     }
 }
 
@@ -170,13 +242,13 @@ impl Neighbourhood {
         self.vertices.len() as u32 - 1
     }
 
-    /// Appends the slots of the cells of all polygons that intersect. A pair is tested in the first of the cells that both
-    /// have in common.
-    fn find_intersections(&self, nets: &Nets, tangled: &mut Vec<u32>) {
+    /// Appends the slots of the cells of all polygons that intersect.
+    fn find_intersections(&self, nets: &Nets, search: &Search, tangled: &mut Vec<u32>) {
         for (i, (slots, polygons)) in self.edges.iter().enumerate() {
             for (others, other_polygons) in &self.edges[..=i] {
-                let first = slots.iter().filter(|slot| others.contains(slot)).min();
-                if first == Some(&self.slot) && self.any_intersect(nets, polygons, other_polygons) {
+                if search.is_tested_in(self.slot, slots, others)
+                    && self.any_intersect(nets, polygons, other_polygons)
+                {
                     tangled.extend(slots);
                     tangled.extend(others);
                 }

@@ -2,6 +2,7 @@
 
 use super::cells::{Cell, CellBox};
 use super::cube_loops;
+use super::envelope::Passage;
 use super::label_grid::BACKGROUND;
 use super::nets::{Nets, halves};
 use crate::math::Vec3;
@@ -27,8 +28,10 @@ pub struct Links {
 pub struct Polygon {
     /// The four cells, counter-clockwise seen from the side of the label with the higher number.
     pub cells: [u32; 4],
-    /// Numbers of the two labels.
+    /// Numbers of the two labels, that at the low end of the edge first.
     pub labels: [u16; 2],
+    /// Axis of the edge.
+    pub axis: u8,
     /// Whether two labels meet in each of them.
     pub pairs: [bool; 4],
 }
@@ -44,6 +47,8 @@ pub struct Zone {
     pub at: Vec<[u32; 3]>,
     /// Positions relative to the centres of the cells.
     pub offsets: Vec<Vec3>,
+    /// How surfaces pass through each cell that moves.
+    pub passages: Vec<Passage>,
     /// Links of each cell that moves.
     pub links: Vec<Links>,
     /// The polygons of which a vertex moves.
@@ -71,13 +76,14 @@ impl Zone {
             let cells = around.map(|slot| index[slot as usize]);
             if cells.iter().any(|&i| (i as usize) < moving) && !cells.contains(&NONE) {
                 let pairs = around.map(|slot| pair(nets.cells.get(slot)).is_some());
-                polygons.push(Polygon { cells, labels: crossing.ends, pairs });
+                polygons.push(Polygon { cells, labels: crossing.ends, axis: crossing.axis as u8, pairs });
             }
         }
         Self {
             area,
             at: slots.iter().map(|&slot| cells(slot).at).collect(),
             offsets: slots.iter().map(|&slot| cells(slot).offset).collect(),
+            passages: slots[..moving].iter().map(|&slot| Passage::of(cells(slot))).collect(),
             slots,
             links,
             polygons,
