@@ -14,8 +14,10 @@
 //! point of its surface stays or comes to be outside the region that it had. So surfaces of two labels, each in its own
 //! region, have nothing in common. Vertices that stay where they are have no other label in their cell.
 //!
-//! Only the edges of a cell matter for the points in it: what two polygons have in common is in cells that both are
-//! around, so it is enough if all polygons around the edges of these pass.
+//! Only the edges of a cell matter for the points in it, and for the region of a label only those at its corners. What two
+//! polygons have in common is in cells that both pass through, so they need no test if all polygons of both labels around
+//! the edges of these cells pass. Corners of a label that are not connected along edges of a cell count as different
+//! labels in it, each with a loop of its own.
 
 use super::cells::Cell;
 use super::cube_loops::cube_loops;
@@ -24,10 +26,8 @@ use super::nets::{AROUND, GAP, Nets};
 use super::zone::{Polygon, Zone, pair};
 use crate::math::Vec3;
 
-/// Largest distance, in voxels, of a returned position in single precision from that in index space.
-const ROUNDING: f32 = 1.1e-3;
 /// Largest distance of a returned position from the position of its cell, with room to spare: half a gap and rounding.
-const DISPLACED: f32 = GAP / 2.0 + 1.5 * ROUNDING;
+const DISPLACED: f32 = 1.3 * GAP / 2.0;
 
 /// How surfaces pass through a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,34 +37,38 @@ pub enum Passage {
     /// Those of two labels, with one vertex each, which are moved to opposite sides: the corners of the label of lower
     /// number, as bits.
     Two(u8),
-    /// Those of several labels, with one vertex each.
+    /// Otherwise.
     More,
-    /// Otherwise: no test of one polygon is made.
-    Other,
 }
 
 impl Passage {
     /// Returns how surfaces pass through a cell.
     pub fn of(cell: &Cell) -> Self {
-        if !cell.is_single || cell.is_saddle || cell.has_diagonal {
-            return Self::Other;
-        }
-        match pair(cell) {
-            Some([BACKGROUND, _]) => Self::One,
-            Some([lower, _]) => Self::Two(cell.case(lower) as u8),
-            None => Self::More,
+        match (cell.simple, pair(cell)) {
+            (1, _) => Self::One,
+            (2, Some([lower, _])) => Self::Two(cell.case(lower) as u8),
+            _ => Self::More,
         }
     }
 }
 
 impl Zone {
+    /// Returns how surfaces pass through the cells of a polygon; `None` if not all of them move.
+    fn passages_of(&self, polygon: &Polygon) -> Option<[Passage; 4]> {
+        let mut passages = [Passage::More; 4];
+        for (passage, &i) in passages.iter_mut().zip(&polygon.cells) {
+            *passage = *self.passages.get(i as usize)?;
+        }
+        Some(passages)
+    }
+
     /// Returns whether a polygon is in the envelope of its edge, and both labels' vertices are moved to their sides of it: if
     /// all around the edges of a cell are, no surfaces intersect in it.
     pub fn is_clear(&self, nets: &Nets, polygon: &Polygon) -> bool {
-        let passages = polygon.cells.map(|i| self.passages.get(i as usize).copied().unwrap_or(Passage::Other));
-        if passages.contains(&Passage::Other) {
+        if polygon.is_divided || nets.rounding() > DISPLACED - GAP / 2.0 {
             return false;
         }
+        let Some(passages) = self.passages_of(polygon) else { return false };
         let frame = Frame::of(polygon);
         let offsets = polygon.cells.map(|i| self.offsets[i as usize]);
         let corner = |i: usize| {
@@ -83,23 +87,26 @@ impl Zone {
             let [a, b, c] = triangle.map(|i| corners[i]);
             let [u, v] = [b - a, c - a];
             let normal = u.cross(v);
-            let least = ROUNDING * normal.length()
+            let least = nets.rounding() * normal.length()
                 + DISPLACED * DISPLACED * (u.length_squared() + v.length_squared() + 2.0 + 4.0 * DISPLACED);
             triangle.iter().all(|&i| {
                 let i = order[i];
-                let inwards = |number: u16, case: usize| {
-                    let clear = frame.turn(cube_loops()[case].clear[0]) * (GAP / 2.0);
-                    let height = normal.dot(clear);
-                    // Normals are towards the label of the higher number.
-                    (if number == frame.lower { -height } else { height }) > least
+                // Normals are towards the label of the higher number.
+                let inwards = |clear: Vec3, is_higher: bool| {
+                    let height = normal.dot(frame.turn(clear)) * (GAP / 2.0);
+                    (if is_higher { height } else { -height }) > least
                 };
                 match passages[i] {
                     Passage::One => true,
-                    Passage::Two(case) => inwards(frame.lower, case.into()),
-                    _ => {
+                    Passage::Two(case) => inwards(cube_loops()[usize::from(case)].clear[0], false),
+                    Passage::More => {
                         let cell = nets.cells.get(self.slots[polygon.cells[i] as usize]);
-                        let mut labels = polygon.labels.iter().filter(|&&number| number != BACKGROUND);
-                        labels.all(|&number| inwards(number, cell.case(number)))
+                        let clear = |number| clear_at(cell, number, polygon.edge_of(i));
+                        let [lower, higher] = polygon.ordered_labels().map(|number| {
+                            if number == BACKGROUND { Some(None) } else { clear(number).map(Some) }
+                        });
+                        lower.is_some_and(|clear| clear.is_none_or(|clear| inwards(clear, false)))
+                            && higher.is_some_and(|clear| clear.is_none_or(|clear| inwards(clear, true)))
                     }
                 }
             })
@@ -108,23 +115,24 @@ impl Zone {
     }
 }
 
-/// The axes seen from the label of the higher number along the edge of a polygon, with the number of the other one.
+/// Returns the direction in which the vertex of a label at an edge of a cell moves to keep clear of others; `None` if its loop
+/// is not around corners of its own.
+fn clear_at(cell: &Cell, number: u16, edge: usize) -> Option<Vec3> {
+    let loops = &cube_loops()[cell.case(number)];
+    loops.is_each_around_own.then(|| loops.clear[usize::from(loops.of_edge[edge])])
+}
+
+/// The axes seen from the label of the higher number along the edge of a polygon.
 struct Frame {
     axes: [usize; 3],
     sign: f32,
-    lower: u16,
 }
 
 impl Frame {
     fn of(polygon: &Polygon) -> Self {
         let [low, high] = polygon.labels;
-        let axis = usize::from(polygon.axis);
-        let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
-        if low < high {
-            Self { axes: [next, last, axis], sign: 1.0, lower: low }
-        } else {
-            Self { axes: [last, next, axis], sign: -1.0, lower: high }
-        }
+        let sign = if low < high { 1.0 } else { -1.0 };
+        Self { axes: polygon.axes.map(usize::from), sign }
     }
 
     fn turn(&self, v: Vec3) -> Vec3 {

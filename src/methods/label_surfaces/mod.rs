@@ -162,7 +162,7 @@ impl LabelSurfaces {
         let cells = surfaces.nets.cells.slots().len();
         surfaces.recount(&pauses).await;
         pauses.after(cells).await;
-        surfaces.wake(everywhere);
+        surfaces.wake(everywhere, &pauses).await;
         pauses.after(cells).await;
         surfaces.coarsen(everywhere, &[], &mut [], &pauses).await;
         Ok(surfaces)
@@ -245,7 +245,8 @@ impl LabelSurfaces {
         let untangle = async |nets: &mut Nets| nets.untangle(touched, None, &pauses).await;
         let untangled = if updated.is_ok() { finished(untangle(&mut self.nets)) } else { Vec::new() };
         let area = changed.grown(HALO, dims);
-        self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
+        let area = self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area));
+        finished(self.wake(area, &pauses));
         let mut reconnected = updated.as_ref().map_or_else(|_| self.nets.no_labels(), Clone::clone);
         finished(self.coarsen(touched, &untangled, &mut reconnected, &pauses));
         updated?;
@@ -298,7 +299,7 @@ impl LabelSurfaces {
         params.check_ranges()?;
         let before = std::mem::replace(&mut self.params, params);
         if self.params.smoothing != before.smoothing {
-            self.wake(self.nets.everywhere());
+            finished(self.wake(self.nets.everywhere(), &Pauses::default()));
         }
         if self.params.edge != before.edge {
             let mut reconnected = self.nets.no_labels();
@@ -340,21 +341,22 @@ impl LabelSurfaces {
             let is_last = self.iterations >= self.params.smoothing;
             let (offsets, diagonals) = (zone.offsets.clone(), zone.diagonals());
             let start = (self.clock)();
+            pauses.after(zone.moving()).await;
             for i in 1..=wanted {
                 self.residual = zone.smooth();
                 if i % BETWEEN == 0 {
                     pauses.after(zone.moving()).await;
-                    zone.balance();
+                    zone.balance(&pauses).await;
                 }
                 pauses.after(zone.moving()).await;
             }
             let start = self.note("smoothing", &mut times, start);
             let balances = if is_last && wanted > 0 { BALANCES } else { 0 };
             for _ in 0..balances {
-                zone.balance();
+                zone.balance(&pauses).await;
                 pauses.after(zone.moving()).await;
             }
-            let noted = if is_last { self.noted(&zone) } else { Vec::new() };
+            let noted = if is_last { self.noted(&zone, &pauses).await } else { Vec::new() };
             zone.write(&mut self.nets);
             if balances > 0 && !noted.is_empty() {
                 zone.balance_thin(&mut self.nets, &noted, &pauses).await;
@@ -362,9 +364,12 @@ impl LabelSurfaces {
             let start = self.note("volumes", &mut times, start);
             let area = zone.area.grown(1, self.nets.grid.dims());
             let [mut moved, mut reconnected] = [(); 2].map(|()| self.nets.no_labels());
+            pauses.after(zone.moving()).await;
             let untangled = self.nets.untangle(area, Some(&mut zone), &pauses).await;
             zone.read(&self.nets);
+            pauses.after(zone.moving()).await;
             self.nets.flag_labels_in(zone.moved_from(&offsets), &mut moved);
+            pauses.after(zone.moving()).await;
             zone.flag_reconnected(&diagonals, &mut reconnected);
             // Diagonals around these are not known, as far as they are outside the zone.
             self.nets.flag_labels_in(untangled.iter().copied(), &mut reconnected);
@@ -386,8 +391,8 @@ impl LabelSurfaces {
 
     /// Returns the labels in a zone that are thin and whose volumes may be off, and those that meet them, in ascending
     /// order.
-    fn noted(&self, zone: &Zone) -> Vec<u16> {
-        let gains = zone.gains(self.label_counts.len());
+    async fn noted(&self, zone: &Zone, pauses: &Pauses) -> Vec<u16> {
+        let gains = zone.gains(self.label_counts.len(), pauses).await;
         let is_off = |number: &u16| {
             let voxels = self.nets.grid.voxels(*number);
             let triangles = self.label_counts[usize::from(*number) - 1].triangles;
@@ -414,11 +419,10 @@ impl LabelSurfaces {
         }
         for &number in measured {
             let voxels = self.nets.grid.voxels(number) as f64;
-            let error = self.nets.volume(number) / voxels - 1.0;
+            let error = self.nets.volume(number, pauses).await / voxels - 1.0;
             if voxels > 0.0 && error.abs() > WARNED {
                 self.off.insert(number, error);
             }
-            pauses.after(self.nets.slots_of(number).len()).await;
         }
     }
 
@@ -450,8 +454,8 @@ impl LabelSurfaces {
         now
     }
 
-    fn wake(&mut self, area: CellBox) {
-        self.zone = Some(Zone::new(&self.nets, area));
+    async fn wake(&mut self, area: CellBox, pauses: &Pauses) {
+        self.zone = Some(Zone::new(&self.nets, area, pauses).await);
         self.iterations = 0;
     }
 
