@@ -8,7 +8,7 @@ use super::zone::{Polygon, Zone, within_reach};
 use crate::math::Vec3;
 use crate::pauses::Pauses;
 use std::ops::{Add, Div, Sub};
-use wide::{CmpLt, f32x4};
+use wide::f32x4;
 
 /// Number of times that differences are averaged over neighbouring cells; the width of the average, a standard
 /// deviation, is about the root of half of it, in voxels.
@@ -72,41 +72,43 @@ impl Zone {
 
 /// Returns for each of up to four polygons the volume that it has swept since its corners, given with their displacements,
 /// were in the middle of their cells, its area, normal to it, and the size of that.
+#[inline]
 pub fn measure_four(polygons: impl Iterator<Item = [(Vec3, Vec3); 4]>) -> [(f32, Vec3, f32); 4] {
-        let [mut middles, mut offsets] = [[[[0.0; 4]; 3]; 4]; 2];
-        for (lane, corners) in polygons.take(4).enumerate() {
-            for (k, (middle, offset)) in corners.into_iter().enumerate() {
-                for axis in 0..3 {
-                    middles[k][axis][lane] = middle[axis];
-                    offsets[k][axis][lane] = offset[axis];
-                }
+    let [mut middles, mut offsets] = [[[[0.0; 4]; 3]; 4]; 2];
+    for (lane, corners) in polygons.take(4).enumerate() {
+        for (k, (middle, offset)) in corners.into_iter().enumerate() {
+            for axis in 0..3 {
+                middles[k][axis][lane] = middle[axis];
+                offsets[k][axis][lane] = offset[axis];
             }
         }
-        let [middles, offsets] = [middles, offsets].map(|corners| corners.map(Four::new));
-        let points = [0, 1, 2, 3].map(|k| middles[k] + offsets[k]);
-        let across = [points[1] - points[3], points[0] - points[2]].map(|way| way.dot(way));
-        let is_other = across[0].simd_lt(across[1]);
-        // The halves, as `halves` divides a quadrilateral.
-        let swept = |k: [usize; 3], other: [usize; 3]| {
-            let select = |corners: &[Four; 4], i: usize| corners[other[i]].or(corners[k[i]], is_other);
-            let [a, b, c] = [0, 1, 2].map(|i| select(&middles, i));
-            let [da, db, dc] = [0, 1, 2].map(|i| select(&offsets, i));
-            let [p, q, r] = [0, 1, 2].map(|i| select(&points, i));
-            let (u, v, du, dv) = (b - a, c - a, db - da, dc - da);
-            let normal = [u.cross(v), u.cross(dv) + du.cross(v), du.cross(dv)];
-            let mean = (da + db + dc) / 6.0;
-            let volume = mean.dot(normal[0] + normal[1] / 2.0 + normal[2] / 3.0);
-            (volume, (q - p).cross(r - p) / 2.0)
-        };
-        let [one, two] = [swept([0, 1, 2], [0, 1, 3]), swept([0, 2, 3], [1, 2, 3])];
-        let (gain, area) = (one.0 + two.0, one.1 + two.1);
-        let (gain, size) = (gain.to_array(), area.dot(area).sqrt().to_array());
-        let area = area.0.map(f32x4::to_array);
-        [0, 1, 2, 3].map(|lane| (gain[lane], Vec3::from(area.map(|lanes| lanes[lane])), size[lane]))
     }
+    let (middles, offsets) = (middles.map(Four::new), offsets.map(Four::new));
+    let points = [0, 1, 2, 3].map(|k| middles[k] + offsets[k]);
+    let across = [points[1] - points[3], points[0] - points[2]].map(|way| way.dot(way));
+    let is_other = across[0].simd_lt(across[1]);
+    // The halves, as `halves` divides a quadrilateral.
+    let swept = |k: [usize; 3], other: [usize; 3]| {
+        let select = |corners: &[Four; 4], i: usize| corners[other[i]].or(corners[k[i]], is_other);
+        let [a, b, c] = [0, 1, 2].map(|i| select(&middles, i));
+        let [da, db, dc] = [0, 1, 2].map(|i| select(&offsets, i));
+        let [p, q, r] = [0, 1, 2].map(|i| select(&points, i));
+        let (u, v, du, dv) = (b - a, c - a, db - da, dc - da);
+        let normal = [u.cross(v), u.cross(dv) + du.cross(v), du.cross(dv)];
+        let mean = (da + db + dc) / 6.0;
+        let volume = mean.dot(normal[0] + normal[1] / 2.0 + normal[2] / 3.0);
+        (volume, (q - p).cross(r - p) / 2.0)
+    };
+    let [one, two] = [swept([0, 1, 2], [0, 1, 3]), swept([0, 2, 3], [1, 2, 3])];
+    let (gain, area) = (one.0 + two.0, one.1 + two.1);
+    let (gain, size) = (gain.to_array(), area.dot(area).sqrt().to_array());
+    let area = area.0.map(f32x4::to_array);
+    [0, 1, 2, 3].map(|lane| (gain[lane], Vec3::from(area.map(|lanes| lanes[lane])), size[lane]))
+}
 
 impl Polygon {
     /// Adds a polygon's share to each of those of its cells in which two labels meet.
+    #[inline]
     fn share(&self, gain: f32, area: Vec3, size: f32, around: &mut [Around]) {
         let share = SHARES[self.pairs.count_ones() as usize];
         for (k, &i) in self.cells.iter().enumerate() {
@@ -126,29 +128,34 @@ impl Polygon {
 struct Four([f32x4; 3]);
 
 impl Four {
+    #[inline]
     fn new(axes: [[f32; 4]; 3]) -> Self {
         Self(axes.map(f32x4::from))
     }
 
+    #[inline]
     fn dot(self, other: Self) -> f32x4 {
         let ([x, y, z], [a, b, c]) = (self.0, other.0);
         x * a + y * b + z * c
     }
 
+    #[inline]
     fn cross(self, other: Self) -> Self {
         let ([x, y, z], [a, b, c]) = (self.0, other.0);
         Self([y * c - b * z, z * a - c * x, x * b - a * y])
     }
 
     /// Returns `self` where `is_self` is set, `other` elsewhere.
+    #[inline]
     fn or(self, other: Self, is_self: f32x4) -> Self {
-        Self([0, 1, 2].map(|axis| is_self.blend(self.0[axis], other.0[axis])))
+        Self([0, 1, 2].map(|axis| is_self.select(self.0[axis], other.0[axis])))
     }
 }
 
 impl Add for Four {
     type Output = Self;
 
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self([0, 1, 2].map(|axis| self.0[axis] + other.0[axis]))
     }
@@ -157,6 +164,7 @@ impl Add for Four {
 impl Sub for Four {
     type Output = Self;
 
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self([0, 1, 2].map(|axis| self.0[axis] - other.0[axis]))
     }
@@ -165,6 +173,7 @@ impl Sub for Four {
 impl Div<f32> for Four {
     type Output = Self;
 
+    #[inline]
     fn div(self, by: f32) -> Self {
         Self(self.0.map(|lanes| lanes / f32x4::splat(by)))
     }

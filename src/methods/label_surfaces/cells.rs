@@ -40,8 +40,15 @@ pub struct Cell {
 impl Cell {
     /// Creates a cell with its vertices in the middle.
     pub fn new(at: [u32; 3], corners: [u16; 8]) -> Self {
-        let mut cell =
-            Self { at, corners, offset: Vec3::ZERO, simple: 0, is_single: true, is_saddle: false, has_diagonal: false };
+        let mut cell = Self {
+            at,
+            corners,
+            offset: Vec3::ZERO,
+            simple: 0,
+            is_single: true,
+            is_saddle: false,
+            has_diagonal: false,
+        };
         cell.set_corners(corners);
         cell
     }
@@ -195,7 +202,10 @@ impl Cells {
             }
         }
         cells.before.clear();
-        cells.before.try_reserve_exact(list.len()).map_err(|_| VolumeError::TooLarge { bytes: 12 * list.len() as u64 })?;
+        cells
+            .before
+            .try_reserve_exact(list.len())
+            .map_err(|_| VolumeError::TooLarge { bytes: 12 * list.len() as u64 })?;
         cells.before.resize(list.len(), [NONE; 3]);
         (cells.list, cells.free) = (list, free);
         for slot in 0..cells.list.len() as u32 {

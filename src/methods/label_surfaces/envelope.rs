@@ -22,7 +22,7 @@
 use super::cells::Cell;
 use super::cube_loops::cube_loops;
 use super::label_grid::BACKGROUND;
-use super::nets::{AROUND, GAP, Nets};
+use super::nets::{AROUND, GAP, Nets, halves};
 use super::zone::{Polygon, Zone, pair};
 use crate::math::Vec3;
 
@@ -62,24 +62,22 @@ impl Zone {
         Some(passages)
     }
 
-    /// Returns whether a polygon is in the envelope of its edge, and both labels' vertices are moved to their sides of it: if
-    /// all around the edges of a cell are, no surfaces intersect in it.
+    /// Returns whether a polygon is in the envelope of its edge, and the vertices of both labels are moved to their sides of it.
+    /// If so for all polygons of a label around the edges of a cell, its surface stays in its own region there.
     pub fn is_clear(&self, nets: &Nets, polygon: &Polygon) -> bool {
         if polygon.is_divided || nets.rounding() > DISPLACED - GAP / 2.0 {
             return false;
         }
         let Some(passages) = self.passages_of(polygon) else { return false };
         let frame = Frame::of(polygon);
-        let offsets = polygon.cells.map(|i| self.offsets[i as usize]);
-        let corner = |i: usize| {
-            let [b, c] = AROUND[i].map(|n| n as f32);
-            frame.turn(offsets[i]) + Vec3::new(b, c, 0.0)
-        };
-        let corners = [0, 1, 2, 3].map(corner);
-        // Divided as in `halves`, with the same rounding: this decides which triangles there are.
-        let from = usize::from(corners[1].distance_squared(corners[3]) < corners[0].distance_squared(corners[2]));
+        // With the rounding of the returned surface: this decides which triangles there are.
+        let [half, _] = halves(self.corners(polygon).map(|(middle, offset)| middle + offset));
+        let from = usize::from(!half.contains(&2));
         let order = [0, 1, 2, 3].map(|i| (from + i) % 4);
-        let corners = order.map(|i| corners[i] - Vec3::new(0.5, 0.5, 0.0));
+        let corners = order.map(|i| {
+            let [b, c] = AROUND[i].map(|n| n as f32 - 0.5);
+            frame.turn(self.offsets[polygon.cells[i] as usize]) + Vec3::new(b, c, 0.0)
+        });
         if !is_in_envelope(corners) {
             return false;
         }
@@ -89,25 +87,18 @@ impl Zone {
             let normal = u.cross(v);
             let least = nets.rounding() * normal.length()
                 + DISPLACED * DISPLACED * (u.length_squared() + v.length_squared() + 2.0 + 4.0 * DISPLACED);
-            triangle.iter().all(|&i| {
-                let i = order[i];
-                // Normals are towards the label of the higher number.
-                let inwards = |clear: Vec3, is_higher: bool| {
-                    let height = normal.dot(frame.turn(clear)) * (GAP / 2.0);
-                    (if is_higher { height } else { -height }) > least
-                };
-                match passages[i] {
-                    Passage::One => true,
-                    Passage::Two(case) => inwards(cube_loops()[usize::from(case)].clear[0], false),
-                    Passage::More => {
-                        let cell = nets.cells.get(self.slots[polygon.cells[i] as usize]);
-                        let clear = |number| clear_at(cell, number, polygon.edge_of(i));
-                        let [lower, higher] = polygon.ordered_labels().map(|number| {
-                            if number == BACKGROUND { Some(None) } else { clear(number).map(Some) }
-                        });
-                        lower.is_some_and(|clear| clear.is_none_or(|clear| inwards(clear, false)))
-                            && higher.is_some_and(|clear| clear.is_none_or(|clear| inwards(clear, true)))
-                    }
+            // Normals are towards the label of the higher number.
+            let is_inwards =
+                |clear: Vec3, side: f32| normal.dot(frame.turn(clear)) * (side * GAP / 2.0) > least;
+            triangle.iter().map(|&i| order[i]).all(|i| match passages[i] {
+                Passage::One => true,
+                Passage::Two(case) => is_inwards(cube_loops()[usize::from(case)].clear[0], -1.0),
+                Passage::More => {
+                    let cell = nets.cells.get(self.slots[polygon.cells[i] as usize]);
+                    let clear = |number| clear_at(cell, number, polygon.edge_of(i));
+                    polygon.ordered_labels().iter().zip([-1.0, 1.0]).all(|(&number, side)| {
+                        number == BACKGROUND || clear(number).is_some_and(|clear| is_inwards(clear, side))
+                    })
                 }
             })
         };

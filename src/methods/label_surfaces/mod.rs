@@ -4,8 +4,9 @@
 //! The surfaces are surface nets: polygons around the edges of the voxel grid that cross from one label to another
 //! (`nets`), whose vertices are smoothed within the grid's cells (`smooth`), so that each voxel stays on its side of
 //! every surface. What smoothing takes from the volume of a label is given back (`balance`; `thin` for labels of a voxel
-//! or two), and intersections are resolved (`untangle`). A label whose volume is still more than 1 % off is named in a
-//! warning. All of this is local: after a change of some voxels, only cells nearby are touched.
+//! or two), and intersections are resolved (`untangle`; `envelope` tells where there are none). A label whose volume is
+//! still more than 1 % off is named in a warning. All of this is local: after a change of some voxels, only cells nearby
+//! are touched.
 //!
 //! Voxels of a label are connected across their faces. Labels that touch are a hundredth of a voxel apart.
 
@@ -162,6 +163,7 @@ impl LabelSurfaces {
         let cells = surfaces.nets.cells.slots().len();
         surfaces.recount(&pauses).await;
         pauses.after(cells).await;
+        // All positions are in the middle, where nothing intersects.
         surfaces.wake(everywhere, &pauses).await;
         pauses.after(cells).await;
         surfaces.coarsen(everywhere, &[], &mut [], &pauses).await;

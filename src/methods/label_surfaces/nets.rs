@@ -397,7 +397,10 @@ fn rounding(to_world: &DAffine3, dims: [usize; 3], origin: DVec3) -> f32 {
     let far = corners.into_iter().map(|p| (to_world.transform_point3(p) - origin).abs().max_element());
     let farthest = far.fold(0.0, f64::max);
     let to_index = to_world.matrix3.inverse();
-    let scale = [to_index.x_axis, to_index.y_axis, to_index.z_axis].iter().map(|axis| axis.length_squared()).sum::<f64>();
+    let scale = [to_index.x_axis, to_index.y_axis, to_index.z_axis]
+        .iter()
+        .map(|axis| axis.length_squared())
+        .sum::<f64>();
     // The half of the last place, along three axes; and of positions within a cell.
     (2.0 * f64::from(f32::EPSILON) * (farthest * scale.sqrt() + 1.0)) as f32
 }

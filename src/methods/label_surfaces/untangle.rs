@@ -104,12 +104,19 @@ struct Search {
 impl Nets {
     /// Moves cells towards their middle until no surfaces intersect in and around the cells of a box, those of a zone that
     /// has their positions and those around it, or any others. Returns the slots of the cells moved.
-    pub async fn untangle(&mut self, area: CellBox, mut zone: Option<&mut Zone>, pauses: &Pauses) -> Vec<u32> {
+    pub async fn untangle(
+        &mut self,
+        area: CellBox,
+        mut zone: Option<&mut Zone>,
+        pauses: &Pauses,
+    ) -> Vec<u32> {
         let mut halved: BTreeMap<u32, u32> = BTreeMap::new();
         let mut search = Search::new(self, zone.as_deref(), pauses).await;
         let mut to_test = self.cells.within(&area);
         pauses.after(to_test.len()).await;
-        let mut candidates = self.cells.within(&area.grown(1, self.grid.dims()));
+        // Without a zone, the first common cell of a pair is one of those to be tested.
+        let around = if zone.is_some() { area.grown(1, self.grid.dims()) } else { area };
+        let mut candidates = self.cells.within(&around);
         pauses.after(candidates.len()).await;
         let mut neighbourhood = Neighbourhood::default();
         while !to_test.is_empty() {
@@ -135,7 +142,7 @@ impl Nets {
                 search.update(self, zone, &tangled, pauses).await;
             }
             to_test = self.with_neighbours(&tangled);
-            candidates = self.with_neighbours(&to_test);
+            candidates = if zone.is_some() { self.with_neighbours(&to_test) } else { to_test.clone() };
         }
         halved.into_keys().collect()
     }
@@ -157,7 +164,8 @@ impl Search {
     /// Tests the polygons of a zone; outside of it, and without one, surfaces may intersect in all cells.
     async fn new(nets: &Nets, zone: Option<&Zone>, pauses: &Pauses) -> Self {
         let slots = nets.cells.slots().len();
-        let mut search = Self { in_doubt: vec![u8::MAX; slots], is_wanted: vec![false; slots], is_clear: Vec::new() };
+        let mut search =
+            Self { in_doubt: vec![u8::MAX; slots], is_wanted: vec![false; slots], is_clear: Vec::new() };
         if let Some(zone) = zone {
             for polygons in zone.polygons.chunks(POLYGONS) {
                 search.is_clear.extend(polygons.iter().map(|polygon| zone.is_clear(nets, polygon)));

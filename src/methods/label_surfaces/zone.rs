@@ -11,7 +11,7 @@ use crate::pauses::Pauses;
 /// Number of cells that are handled between two pauses.
 const CHUNK: usize = 128;
 /// Work that the links of a cell, and the polygons that begin at it, count as.
-const WORK_OF_LINKS: usize = 2;
+const WORK_OF_LINKS: usize = 3;
 const WORK_OF_POLYGONS: usize = 2;
 /// Stands for a cell that does not exist, or is not in the zone.
 pub const NONE: u32 = u32::MAX;
@@ -123,7 +123,8 @@ impl Zone {
         let mut neighbours = Neighbours { beyond: vec![[NONE; 6]; zone.slots.len()], pairs: Vec::new() };
         for slots in zone.slots.chunks(CHUNK) {
             for &slot in slots {
-                let before = nets.cells.before(slot).map(|slot| index.get(slot as usize).copied().unwrap_or(NONE));
+                let before =
+                    nets.cells.before(slot).map(|slot| index.get(slot as usize).copied().unwrap_or(NONE));
                 neighbours.add(nets.cells.get(slot), before);
                 zone.offsets.push(nets.cells.get(slot).offset);
             }
@@ -245,9 +246,8 @@ impl Neighbours {
     /// Returns the cells around the edge that begins at the first corner of a cell, along an axis, in the order of those of a
     /// crossing.
     fn around(&self, i: u32, axis: usize) -> [u32; 4] {
-        let before = |i: u32, axis: usize| {
-            self.beyond.get(i as usize).map_or(NONE, |beyond| beyond[2 * (axis % 3)])
-        };
+        let before =
+            |i: u32, axis: usize| self.beyond.get(i as usize).map_or(NONE, |beyond| beyond[2 * (axis % 3)]);
         let [next, last] = [axis + 1, axis + 2].map(|axis| before(i, axis));
         [before(next, axis + 2), last, i, next]
     }
