@@ -62,26 +62,26 @@ struct ThinLabel {
     links: Vec<[u32; 6]>,
     /// Whether two labels meet in each of `cells`.
     is_pair: Vec<bool>,
-    /// What was measured last.
+    /// The last measurement.
     measured: Measured,
     /// The volume of the whole surface, and the time when it was measured.
     volume: Option<(u32, f64)>,
 }
 
-/// What the polygons of a label have gained.
+/// The gains of the polygons of a label.
 #[derive(Default)]
 struct Measured {
     /// Time of the measurement; 0 if there was none.
     at: u32,
     /// The volume that the label has gained at each polygon.
     gains: Vec<f32>,
-    /// What is missing around each cell, but for the bias.
+    /// Volume that is missing around each cell, but for the bias.
     missing: Vec<Missing>,
     /// Sum of the amounts of surface.
     size: f32,
 }
 
-/// When each cell of a zone was last moved. What depends on cells that have not moved since is not measured again.
+/// The time when each cell of a zone was last moved. Measures of cells that have not moved since are not taken again.
 struct Moves {
     now: u32,
     of_cells: Vec<u32>,
