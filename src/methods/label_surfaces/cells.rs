@@ -28,6 +28,8 @@ pub struct Cell {
     pub offset: Vec3,
     /// Number of surfaces that pass through the cell, if each does so once and they are one or two, else 0.
     pub simple: u8,
+    /// Whether no label has more than one vertex in the cell.
+    pub is_single: bool,
     /// Whether two labels meet in the cell like in a saddle: at some edge between them, their vertices do not move apart
     /// along the edge, since they do so the other way at another edge.
     pub is_saddle: bool,
@@ -38,8 +40,15 @@ pub struct Cell {
 impl Cell {
     /// Creates a cell with its vertices in the middle.
     pub fn new(at: [u32; 3], corners: [u16; 8]) -> Self {
-        let mut cell =
-            Self { at, corners, offset: Vec3::ZERO, simple: 0, is_saddle: false, has_diagonal: false };
+        let mut cell = Self {
+            at,
+            corners,
+            offset: Vec3::ZERO,
+            simple: 0,
+            is_single: true,
+            is_saddle: false,
+            has_diagonal: false,
+        };
         cell.set_corners(corners);
         cell
     }
@@ -49,6 +58,7 @@ impl Cell {
         let counts = self.numbers().map(|number| self.vertices_of(number));
         let (surfaces, most) = counts.fold((0, 0), |(surfaces, most), count| (surfaces + 1, count.max(most)));
         self.simple = if surfaces <= 2 && most == 1 { surfaces } else { 0 };
+        self.is_single = most <= 1;
         self.is_saddle = surfaces >= 2 && self.has_edge_without_gap();
         self.has_diagonal =
             (0..3).any(|axis| [false, true].iter().any(|&far| self.has_diagonal_on(axis, far)));
@@ -144,6 +154,8 @@ pub struct Cells {
     /// Slot of each cell of an allocated block; [`NONE`] for cells that are not stored.
     slots: Vec<[u32; PER_BLOCK]>,
     list: Vec<Cell>,
+    /// Slots of the neighbours of each cell along −x, −y and −z; [`NONE`] for those that are not stored.
+    before: Vec<[u32; 3]>,
     free: Vec<u32>,
 }
 
@@ -158,7 +170,7 @@ impl Cells {
         let mut table = Vec::new();
         table.try_reserve_exact(size).map_err(|_| VolumeError::TooLarge { bytes: 4 * size as u64 })?;
         table.resize(size, NONE);
-        Ok(Self { blocks, table, slots: Vec::new(), list: Vec::new(), free: Vec::new() })
+        Ok(Self { blocks, table, slots: Vec::new(), list: Vec::new(), before: Vec::new(), free: Vec::new() })
     }
 
     /// Creates the table of cells that are in given slots; `None` if two are the same, or the free slots are not those in
@@ -189,7 +201,18 @@ impl Cells {
                 cells.slots[cells.table[block] as usize][index] = slot;
             }
         }
+        cells.before.clear();
+        cells
+            .before
+            .try_reserve_exact(list.len())
+            .map_err(|_| VolumeError::TooLarge { bytes: 12 * list.len() as u64 })?;
+        cells.before.resize(list.len(), [NONE; 3]);
         (cells.list, cells.free) = (list, free);
+        for slot in 0..cells.list.len() as u32 {
+            if cells.get(slot).is_live() {
+                cells.link(slot);
+            }
+        }
         Ok(Some(cells))
     }
 
@@ -221,6 +244,39 @@ impl Cells {
         let (block, index) = self.place(at)?;
         let slot = self.slots.get(self.table[block] as usize)?[index];
         (slot != NONE).then_some(slot)
+    }
+
+    /// Returns the slots of the cells around the edge that begins at the first corner of the cell in a slot, along an axis:
+    /// before it along both other axes, after it along the first, along both, and along the second of these; `None` unless
+    /// all are stored.
+    #[inline]
+    pub fn around(&self, slot: u32, axis: usize) -> Option<[u32; 4]> {
+        let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
+        let before = self.before[slot as usize];
+        let [first, second, fourth] =
+            [self.before.get(before[next] as usize)?[last], before[last], before[next]];
+        (first != NONE && second != NONE).then_some([first, second, slot, fourth])
+    }
+
+    /// Returns the slots of the neighbours of the cell in a slot along −x, −y and −z; [`u32::MAX`] for those that are not
+    /// stored.
+    #[inline]
+    pub fn before(&self, slot: u32) -> [u32; 3] {
+        self.before[slot as usize]
+    }
+
+    /// Links a stored cell with its neighbours.
+    fn link(&mut self, slot: u32) {
+        let at = self.get(slot).at;
+        for axis in 0..3 {
+            let [mut before, mut after] = [at; 2];
+            before[axis] = before[axis].wrapping_sub(1);
+            after[axis] += 1;
+            self.before[slot as usize][axis] = self.find(before).unwrap_or(NONE);
+            if let Some(after) = self.find(after) {
+                self.before[after as usize][axis] = slot;
+            }
+        }
     }
 
     /// Returns the slots of the cells of a box, in the order of z, y and x.
@@ -341,11 +397,16 @@ impl Cells {
         let cell = Cell::new(at, corners);
         if let Some(free) = self.free.pop() {
             (*slot, self.list[free as usize]) = (free, cell);
+            self.link(free);
             return Ok(());
         }
         grow(&mut self.list)?;
-        *slot = self.list.len() as u32;
+        grow(&mut self.before)?;
+        let fresh = self.list.len() as u32;
+        *slot = fresh;
         self.list.push(cell);
+        self.before.push([NONE; 3]);
+        self.link(fresh);
         Ok(())
     }
 
@@ -354,6 +415,13 @@ impl Cells {
         self.slots[self.table[block] as usize][index] = NONE;
         self.list[slot as usize].corners = [0; 8];
         self.free.push(slot);
+        for axis in 0..3 {
+            let mut after = at;
+            after[axis] += 1;
+            if let Some(after) = self.find(after) {
+                self.before[after as usize][axis] = NONE;
+            }
+        }
     }
 
     /// Returns the block of a cell, as an index into `table`, and the cell's index in it.

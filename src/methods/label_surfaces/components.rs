@@ -45,6 +45,7 @@ impl Components {
                 self.blocks.resize_with(index + 1, BlockComponents::default);
             }
             self.blocks[index] = BlockComponents::new(cells, index, at);
+            pauses.after(cells.in_block(index).flatten().count()).await;
         }
         self.count = self.joined(cells);
     }
@@ -122,6 +123,9 @@ impl BlockComponents {
 
 /// Returns the number of vertices in a cell.
 fn vertices_in(cell: &Cell) -> usize {
+    if cell.is_single {
+        return cell.numbers().count();
+    }
     cell.numbers().map(|number| cell.vertices_of(number)).sum()
 }
 
@@ -140,6 +144,9 @@ fn passing_face(cell: &Cell, axis: usize, far: bool) -> impl Iterator<Item = usi
 
 /// Returns which of the vertices in a cell is that of a label at an edge that is crossed.
 fn vertex_of(cell: &Cell, number: u16, edge: usize) -> usize {
+    if cell.is_single {
+        return cell.numbers().take_while(|&other| other != number).count();
+    }
     let before = cell.numbers().take_while(|&other| other != number);
     before.map(|other| cell.vertices_of(other)).sum::<usize>()
         + usize::from(cube_loops()[cell.case(number)].of_edge[edge])

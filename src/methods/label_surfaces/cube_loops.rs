@@ -20,6 +20,8 @@ pub struct CubeLoops {
     /// For each loop, the direction in which its vertex moves to keep clear of other surfaces in the cell: towards the
     /// side with the label, 1 long where the surface is flat.
     pub clear: [Vec3; 4],
+    /// Whether each loop is around corners of its own, which are connected along edges of the cell.
+    pub is_each_around_own: bool,
 }
 
 /// Returns the loops for all sets of corners; bit c of the index is set if corner c has the label, numbered as in
@@ -65,6 +67,22 @@ pub fn corner_offset(corner: usize) -> [usize; 3] {
     FAR.map(|bit| usize::from(corner & bit != 0))
 }
 
+/// Returns the number of parts of a set of corners that are connected along edges of the cell.
+fn connected(case: usize) -> usize {
+    let (mut left, mut parts) = (case, 0);
+    while left != 0 {
+        let mut part = left & left.wrapping_neg();
+        while let Some(next) = (0..8).find(|corner| {
+            let is_beside = FAR.iter().any(|bit| part >> (corner ^ bit) & 1 == 1);
+            is_beside && left & !part & (1 << corner) != 0
+        }) {
+            part |= 1 << next;
+        }
+        (left, parts) = (left & !part, parts + 1);
+    }
+    parts
+}
+
 fn derive(case: usize) -> CubeLoops {
     let mut found = CubeLoops::default();
     for (index, contour) in loops(case).iter().enumerate() {
@@ -78,6 +96,7 @@ fn derive(case: usize) -> CubeLoops {
         found.clear[index] = clear;
         found.count += 1;
     }
+    found.is_each_around_own = usize::from(found.count) == connected(case);
     if case.count_ones() == 6 && found.count == 2 {
         // Around two opposite corners without the label, which each vertex must not approach: it moves towards its own
         // corner instead, less far than the vertices of that corner's label.

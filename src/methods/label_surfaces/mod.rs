@@ -4,8 +4,9 @@
 //! The surfaces are surface nets: polygons around the edges of the voxel grid that cross from one label to another
 //! (`nets`), whose vertices are smoothed within the grid's cells (`smooth`), so that each voxel stays on its side of
 //! every surface. What smoothing takes from the volume of a label is given back (`balance`; `thin` for labels of a voxel
-//! or two), and intersections are resolved (`untangle`). A label whose volume is still more than 1 % off is named in a
-//! warning. All of this is local: after a change of some voxels, only cells nearby are touched.
+//! or two), and intersections are resolved (`untangle`; `envelope` tells where there are none). A label whose volume is
+//! still more than 1 % off is named in a warning. All of this is local: after a change of some voxels, only cells nearby
+//! are touched.
 //!
 //! Voxels of a label are connected across their faces. Labels that touch are a hundredth of a voxel apart.
 
@@ -15,6 +16,7 @@ mod coarsen;
 mod components;
 mod counts;
 mod cube_loops;
+mod envelope;
 mod extract;
 mod label_grid;
 mod nets;
@@ -161,8 +163,8 @@ impl LabelSurfaces {
         let cells = surfaces.nets.cells.slots().len();
         surfaces.recount(&pauses).await;
         pauses.after(cells).await;
-        surfaces.nets.untangle(everywhere, &pauses).await;
-        surfaces.wake(everywhere);
+        // All positions are in the middle, where nothing intersects.
+        surfaces.wake(everywhere, &pauses).await;
         pauses.after(cells).await;
         surfaces.coarsen(everywhere, &[], &mut [], &pauses).await;
         Ok(surfaces)
@@ -242,10 +244,11 @@ impl LabelSurfaces {
         }
         finished(self.count(&touched, Counts::add, &pauses));
         finished(self.components.update(&self.nets.cells, &changed, &pauses));
-        let untangle = async |nets: &mut Nets| nets.untangle(touched, &pauses).await;
+        let untangle = async |nets: &mut Nets| nets.untangle(touched, None, &pauses).await;
         let untangled = if updated.is_ok() { finished(untangle(&mut self.nets)) } else { Vec::new() };
         let area = changed.grown(HALO, dims);
-        self.wake(self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area)));
+        let area = self.zone.as_ref().map_or(area, |unfinished| unfinished.area.union(&area));
+        finished(self.wake(area, &pauses));
         let mut reconnected = updated.as_ref().map_or_else(|_| self.nets.no_labels(), Clone::clone);
         finished(self.coarsen(touched, &untangled, &mut reconnected, &pauses));
         updated?;
@@ -298,7 +301,7 @@ impl LabelSurfaces {
         params.check_ranges()?;
         let before = std::mem::replace(&mut self.params, params);
         if self.params.smoothing != before.smoothing {
-            self.wake(self.nets.everywhere());
+            finished(self.wake(self.nets.everywhere(), &Pauses::default()));
         }
         if self.params.edge != before.edge {
             let mut reconnected = self.nets.no_labels();
@@ -340,21 +343,22 @@ impl LabelSurfaces {
             let is_last = self.iterations >= self.params.smoothing;
             let (offsets, diagonals) = (zone.offsets.clone(), zone.diagonals());
             let start = (self.clock)();
+            pauses.after(zone.moving()).await;
             for i in 1..=wanted {
                 self.residual = zone.smooth();
                 if i % BETWEEN == 0 {
                     pauses.after(zone.moving()).await;
-                    zone.balance();
+                    zone.balance(&pauses).await;
                 }
                 pauses.after(zone.moving()).await;
             }
             let start = self.note("smoothing", &mut times, start);
             let balances = if is_last && wanted > 0 { BALANCES } else { 0 };
             for _ in 0..balances {
-                zone.balance();
+                zone.balance(&pauses).await;
                 pauses.after(zone.moving()).await;
             }
-            let noted = if is_last { self.noted(&zone) } else { Vec::new() };
+            let noted = if is_last { self.noted(&zone, &pauses).await } else { Vec::new() };
             zone.write(&mut self.nets);
             if balances > 0 && !noted.is_empty() {
                 zone.balance_thin(&mut self.nets, &noted, &pauses).await;
@@ -362,9 +366,12 @@ impl LabelSurfaces {
             let start = self.note("volumes", &mut times, start);
             let area = zone.area.grown(1, self.nets.grid.dims());
             let [mut moved, mut reconnected] = [(); 2].map(|()| self.nets.no_labels());
-            let untangled = self.nets.untangle(area, &pauses).await;
+            pauses.after(zone.moving()).await;
+            let untangled = self.nets.untangle(area, Some(&mut zone), &pauses).await;
             zone.read(&self.nets);
+            pauses.after(zone.moving()).await;
             self.nets.flag_labels_in(zone.moved_from(&offsets), &mut moved);
+            pauses.after(zone.moving()).await;
             zone.flag_reconnected(&diagonals, &mut reconnected);
             // Diagonals around these are not known, as far as they are outside the zone.
             self.nets.flag_labels_in(untangled.iter().copied(), &mut reconnected);
@@ -386,8 +393,8 @@ impl LabelSurfaces {
 
     /// Returns the labels in a zone that are thin and whose volumes may be off, and those that meet them, in ascending
     /// order.
-    fn noted(&self, zone: &Zone) -> Vec<u16> {
-        let gains = zone.gains(self.label_counts.len());
+    async fn noted(&self, zone: &Zone, pauses: &Pauses) -> Vec<u16> {
+        let gains = zone.gains(self.label_counts.len(), pauses).await;
         let is_off = |number: &u16| {
             let voxels = self.nets.grid.voxels(*number);
             let triangles = self.label_counts[usize::from(*number) - 1].triangles;
@@ -414,11 +421,10 @@ impl LabelSurfaces {
         }
         for &number in measured {
             let voxels = self.nets.grid.voxels(number) as f64;
-            let error = self.nets.volume(number) / voxels - 1.0;
+            let error = self.nets.volume(number, pauses).await / voxels - 1.0;
             if voxels > 0.0 && error.abs() > WARNED {
                 self.off.insert(number, error);
             }
-            pauses.after(self.nets.slots_of(number).len()).await;
         }
     }
 
@@ -450,8 +456,8 @@ impl LabelSurfaces {
         now
     }
 
-    fn wake(&mut self, area: CellBox) {
-        self.zone = Some(Zone::new(&self.nets, area));
+    async fn wake(&mut self, area: CellBox, pauses: &Pauses) {
+        self.zone = Some(Zone::new(&self.nets, area, pauses).await);
         self.iterations = 0;
     }
 

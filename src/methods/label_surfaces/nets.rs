@@ -13,10 +13,10 @@ use super::coarsen::Coarsening;
 use super::cube_loops::{FAR, corner_offset, cube_loops, edge_at, face};
 use super::label_grid::{BACKGROUND, LabelGrid};
 use crate::math::order::sort_distinct;
-use crate::math::{DAffine3, DVec3, Vec3};
+use crate::math::{DAffine3, DVec3, Vec3, box_corners};
 use crate::mesh::grid_origin;
 use crate::methods::MethodError;
-use crate::pauses::Pauses;
+use crate::pauses::{Pauses, finished};
 use crate::volume::VolumeError;
 
 /// Largest number of cells through which surfaces pass; more take more than a gigabyte. Labels of noise have as many in 200³
@@ -24,6 +24,8 @@ use crate::volume::VolumeError;
 const MOST_CELLS: usize = 8_000_000;
 /// Work that a layer of voxels counts as, whatever is in it.
 const LAYER_WORK: usize = 50;
+/// Work that finding and storing a cell counts as.
+const WORK_OF_CELL: usize = 2;
 
 /// Width of the gap between surfaces that touch, in voxels.
 pub const GAP: f32 = 0.01;
@@ -70,7 +72,7 @@ pub struct Crossing {
 }
 
 /// Position, along the two axes after that of the edge, of the four cells around it: 0 before it, 1 after.
-const AROUND: [[usize; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
+pub const AROUND: [[usize; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
 
 /// The polygon of one label around an edge of the grid, as triangles.
 #[derive(Clone, Copy, Debug)]
@@ -105,6 +107,8 @@ pub struct Nets {
     to_world: DAffine3,
     /// The origin of all surfaces in world space.
     origin: DVec3,
+    /// Largest distance, in voxels, of a returned position in single precision from that in index space.
+    rounding: f32,
 }
 
 impl Nets {
@@ -116,7 +120,8 @@ impl Nets {
     pub async fn new(grid: LabelGrid, to_world: DAffine3, pauses: &Pauses) -> Result<Self, MethodError> {
         let (cells, coarse, of_labels) = (Cells::new(grid.dims())?, Coarsening::default(), Vec::new());
         let origin = grid_origin(&to_world, grid.dims());
-        let mut nets = Self { cells, coarse, of_labels, grid, to_world, origin };
+        let rounding = rounding(&to_world, grid.dims(), origin);
+        let mut nets = Self { cells, coarse, of_labels, grid, to_world, origin, rounding };
         let everywhere = nets.everywhere();
         let mut changed = nets.no_labels();
         for z in everywhere.low[2]..=everywhere.high[2] {
@@ -132,10 +137,9 @@ impl Nets {
                 );
                 return Err(MethodError::invalid("volume", problem));
             }
-            pauses.after(cells - before + LAYER_WORK).await;
+            pauses.after(WORK_OF_CELL * (cells - before) + LAYER_WORK).await;
         }
-        nets.list(everywhere, &changed);
-        pauses.after(nets.cells.slots().len()).await;
+        nets.list(everywhere, &changed, pauses).await;
         Ok(nets)
     }
 
@@ -147,14 +151,17 @@ impl Nets {
     pub fn update(&mut self, area: CellBox) -> Result<Vec<bool>, VolumeError> {
         let mut changed = self.no_labels();
         self.cells.update(&self.grid, area, &mut changed)?;
-        self.list(area, &changed);
+        finished(self.list(area, &changed, &Pauses::default()));
         Ok(changed)
     }
 
     /// Lists the cells in which labels are that have `changed` in a box.
-    fn list(&mut self, area: CellBox, changed: &[bool]) {
+    async fn list(&mut self, area: CellBox, changed: &[bool], pauses: &Pauses) {
         self.of_labels.resize(changed.len() - 1, Vec::new());
-        for slot in self.cells.within(&area) {
+        let within = self.cells.within(&area);
+        pauses.after(within.len()).await;
+        for slot in within {
+            pauses.after(1).await;
             for number in self.cells.get(slot).numbers().filter(|&number| changed[usize::from(number)]) {
                 self.of_labels[usize::from(number) - 1].push(slot);
             }
@@ -165,6 +172,7 @@ impl Nets {
         {
             slots.retain(|&slot| cells.get(slot).corners.contains(&number));
             sort_distinct(slots);
+            pauses.after(slots.len()).await;
         }
     }
 
@@ -175,7 +183,7 @@ impl Nets {
             cell.numbers().for_each(|number| of_labels[usize::from(number) - 1].push(slot));
         }
         let coarse = Coarsening::default();
-        *self = Self { grid, cells, coarse, of_labels, to_world: self.to_world, origin: self.origin };
+        *self = Self { grid, cells, coarse, of_labels, ..*self };
     }
 
     /// Returns the slots of the cells in which a label is, in ascending order.
@@ -207,6 +215,11 @@ impl Nets {
         self.origin
     }
 
+    /// Returns the largest distance, in voxels, of a returned position in single precision from that in index space.
+    pub fn rounding(&self) -> f32 {
+        self.rounding
+    }
+
     /// Returns the box of all cells.
     pub fn everywhere(&self) -> CellBox {
         CellBox { low: [0; 3], high: self.grid.dims().map(|n| n as u32) }
@@ -216,28 +229,14 @@ impl Nets {
     /// label.
     #[inline]
     pub fn crossings(&self, slot: u32) -> impl Iterator<Item = Crossing> + '_ {
-        let cell = *self.cells.get(slot);
+        let corners = &self.cells.get(slot).corners;
         (0..3).filter_map(move |axis| {
-            let ends = [cell.corners[0], cell.corners[FAR[axis]]];
+            let ends = [corners[0], corners[FAR[axis]]];
             if ends[0] == ends[1] {
                 return None;
             }
-            Some(Crossing { axis, ends, slots: self.cells_around(cell.at, axis)? })
+            Some(Crossing { axis, ends, slots: self.cells.around(slot, axis)? })
         })
-    }
-
-    /// Returns the slots of the cells around the edge that begins at the first corner of a cell, along an axis; `None`
-    /// unless surfaces pass through all four.
-    #[inline]
-    fn cells_around(&self, cell: [u32; 3], axis: usize) -> Option<[u32; 4]> {
-        let mut slots = [0; 4];
-        for (slot, [b, c]) in slots.iter_mut().zip(AROUND) {
-            let mut at = cell;
-            at[(axis + 1) % 3] -= 1 - b as u32;
-            at[(axis + 2) % 3] -= 1 - c as u32;
-            *slot = self.cells.find(at)?;
-        }
-        Some(slots)
     }
 
     /// Returns the polygon of the label at the `far` or near end of a crossed edge.
@@ -383,12 +382,27 @@ impl Nets {
     /// The point of an edge lies at the mean height of the four cells around it.
     fn edge_position(&self, slot: u32, axis: usize, far: bool, from: [u32; 3]) -> Vec3 {
         let cell = self.cells.get(slot);
-        let around = self.cells_around(cell.at, axis).unwrap_or([slot; 4]);
+        let around = self.cells.around(slot, axis).unwrap_or([slot; 4]);
         let height: f32 = around.iter().map(|&slot| self.cells.get(slot).offset[axis] / 4.0).sum();
         let mut point = Vec3::splat(-0.5);
         point[axis] = height + if far { GAP / 2.0 } else { -GAP / 2.0 };
         steps(from, cell.at) + point
     }
+}
+
+/// Returns the largest distance, in voxels, of positions in world space that are rounded to single precision from those in
+/// index space, with room to spare.
+fn rounding(to_world: &DAffine3, dims: [usize; 3], origin: DVec3) -> f32 {
+    let corners = box_corners(DVec3::splat(-1.0), DVec3::from(dims.map(|n| n as f64)));
+    let far = corners.into_iter().map(|p| (to_world.transform_point3(p) - origin).abs().max_element());
+    let farthest = far.fold(0.0, f64::max);
+    let to_index = to_world.matrix3.inverse();
+    let scale = [to_index.x_axis, to_index.y_axis, to_index.z_axis]
+        .iter()
+        .map(|axis| axis.length_squared())
+        .sum::<f64>();
+    // The half of the last place, along three axes; and of positions within a cell.
+    (2.0 * f64::from(f32::EPSILON) * (farthest * scale.sqrt() + 1.0)) as f32
 }
 
 /// Returns the triangles into which the shorter diagonal divides a quadrilateral, as indices of its corners.

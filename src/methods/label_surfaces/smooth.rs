@@ -24,7 +24,7 @@ impl Zone {
     /// Returns the mean position of the neighbours of a cell, relative to its centre.
     fn mean(&self, i: usize) -> Vec3 {
         let (mut sum, mut count) = (Vec3::ZERO, 0.0);
-        for (face, &neighbour) in self.links[i].towards.iter().enumerate() {
+        for (face, &neighbour) in self.towards[i].iter().enumerate() {
             if neighbour != NONE {
                 sum += self.offsets[neighbour as usize] + step_to(face);
                 count += 1.0;

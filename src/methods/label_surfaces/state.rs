@@ -82,7 +82,7 @@ impl LabelSurfaces {
         self.zone = None;
         finished(self.coarsen(self.nets.everywhere(), &[], &mut [], &pauses));
         if let Some([low, high]) = state.area {
-            self.wake(CellBox { low, high });
+            finished(self.wake(CellBox { low, high }, &pauses));
         }
         if let Some([low, high]) = state.pending {
             finished(self.coarsen(CellBox { low, high }, &[], &mut [], &pauses));

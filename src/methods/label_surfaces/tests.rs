@@ -720,7 +720,7 @@ fn creation_pauses_in_each_of_its_parts() {
     while advance(&mut creation).is_pending() {
         pauses += 1;
     }
-    // All cells are visited nine times: to find and count them, to join components, to test for intersections, ...
+    // For each cell, nine units of work: to find, list and count it, to join components, to link it with its neighbours, ...
     let cells = 40_usize.pow(3);
     assert!(pauses > 9 * cells / 500, "{pauses}");
 }

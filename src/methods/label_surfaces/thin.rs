@@ -3,14 +3,15 @@
 //! given to the cells nearby in which only two labels meet, as far as these reach, and includes the gaps between labels,
 //! which count for half a per cent of a voxel's thickness on each side. What is still missing is measured.
 
-use super::balance::{MOST, averaged, gain_of};
+use super::balance::{MOST, POLYGONS, averaged, measure_four};
 use super::cube_loops::cube_loops;
 use super::label_grid::BACKGROUND;
 use super::nets::{GAP, NetVertex, Nets};
-use super::zone::{NONE, Polygon, Zone, pair, step_to, within_reach};
-use crate::math::Vec3;
+use super::zone::{NONE, Polygon, Zone, pair, within_reach};
 use crate::math::order::sort_distinct;
+use crate::math::{DVec3, Vec3};
 use crate::pauses::Pauses;
+use smallvec::SmallVec;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The number of voxels per face below which a label is thin; a sheet of four voxels between others has two. Above, what
@@ -29,6 +30,9 @@ const ROUNDS: usize = 40;
 const MEASURES: usize = 5;
 /// The share of the difference that has to be left by a round for another one to be made.
 const PROGRESS: f64 = 0.99;
+/// Number of polygons that are measured, and of cells that volume is given to, in a unit of work.
+const POLYGONS_MEASURED: usize = 16;
+const CELLS_GIVEN: usize = 8;
 /// Least displacement along the normal, in voxels, for which a cell must have room to take part.
 const ROOM: f32 = 0.02;
 
@@ -58,6 +62,35 @@ struct ThinLabel {
     links: Vec<[u32; 6]>,
     /// Whether two labels meet in each of `cells`.
     is_pair: Vec<bool>,
+    /// The last measurement.
+    measured: Measured,
+    /// The volume of the whole surface, and the time when it was measured.
+    volume: Option<(u32, f64)>,
+}
+
+/// The gains of the polygons of a label.
+#[derive(Default)]
+struct Measured {
+    /// Time of the measurement; 0 if there was none.
+    at: u32,
+    /// The volume that the label has gained at each polygon.
+    gains: Vec<f32>,
+    /// Volume that is missing around each cell, but for the bias.
+    missing: Vec<Missing>,
+    /// Sum of the amounts of surface.
+    size: f32,
+}
+
+/// The time when each cell of a zone was last moved. Measures of cells that have not moved since are not taken again.
+struct Moves {
+    now: u32,
+    of_cells: Vec<u32>,
+}
+
+impl Moves {
+    fn any_since(&self, at: u32, cells: &[u32]) -> bool {
+        cells.iter().any(|&i| self.of_cells[i as usize] > at)
+    }
 }
 
 /// Volume that is missing around a cell.
@@ -71,47 +104,53 @@ struct Missing {
 
 impl Zone {
     /// Returns the volume that each label has gained in the zone, by number, about: with what the gaps take.
-    pub fn gains(&self, labels: usize) -> Vec<f64> {
+    pub async fn gains(&self, labels: usize, pauses: &Pauses) -> Vec<f64> {
         let mut gains = vec![0.0; labels + 1];
-        for polygon in &self.polygons {
-            let (gain, area) = self.gain(polygon);
-            let [lower, higher] = [0, 1].map(|k| {
-                let [a, b] = polygon.labels;
-                usize::from(if k == 0 { a.min(b) } else { a.max(b) })
-            });
-            let gap = if lower == usize::from(BACKGROUND) { 0.0 } else { area.length() * GAP / 2.0 };
-            gains[lower] += f64::from(gain - gap);
-            gains[higher] -= f64::from(gain + gap);
+        for polygons in self.polygons.chunks(POLYGONS) {
+            for four in polygons.chunks(4) {
+                let measures = measure_four(four.iter().map(|polygon| self.corners(polygon)));
+                for (polygon, (gain, _, size)) in four.iter().zip(measures) {
+                    let [lower, higher] = polygon.ordered_labels().map(usize::from);
+                    let gap = if lower == usize::from(BACKGROUND) { 0.0 } else { size * GAP / 2.0 };
+                    gains[lower] += f64::from(gain - gap);
+                    gains[higher] -= f64::from(gain + gap);
+                }
+            }
+            pauses.after(POLYGONS / POLYGONS_MEASURED).await;
         }
         gains
     }
 
     /// Adds the labels that meet the given ones.
     pub fn add_neighbours(&self, labels: &mut BTreeSet<u16>) {
-        let mut neighbours = Vec::new();
-        for [a, b] in self.polygons.iter().map(|polygon| polygon.labels) {
-            neighbours.extend(labels.contains(&a).then_some(b));
-            neighbours.extend(labels.contains(&b).then_some(a));
+        let mut is_given = vec![false; usize::from(u16::MAX) + 1];
+        labels.iter().for_each(|&number| is_given[usize::from(number)] = true);
+        let mut is_met = is_given.clone();
+        for [a, b] in self.polygons.iter().map(|polygon| polygon.labels.map(usize::from)) {
+            is_met[a] |= is_given[b];
+            is_met[b] |= is_given[a];
         }
-        labels.extend(neighbours.into_iter().filter(|&number| number != BACKGROUND));
+        let met = (0..=u16::MAX).zip(is_met).filter_map(|(number, is_met)| is_met.then_some(number));
+        labels.extend(met.filter(|&number| number != BACKGROUND));
     }
 
     /// Gives volume to the given labels, the thinner ones first, until they have that of their voxels in the zone, or cells
     /// have no more room, and copies the positions to the surfaces.
     pub async fn balance_thin(&mut self, nets: &mut Nets, labels: &[u16], pauses: &Pauses) {
-        let mut labels = self.thin_labels(nets, labels);
+        let mut labels = self.thin_labels(nets, labels, pauses).await;
+        let mut moves = Moves { now: 1, of_cells: vec![1; self.moving()] };
         for _ in 0..MEASURES {
             self.write(nets);
             for label in &mut labels {
                 label.bias = if label.is_whole {
-                    let (_, missing) = self.missing(label);
-                    label.voxels - nets.volume(label.number) - (missing - label.bias)
+                    let missing = self.missing(label, &moves, pauses).await;
+                    let volume = label.volume(nets, &moves, pauses).await;
+                    label.voxels - volume - (missing - label.bias)
                 } else {
                     0.0
                 };
-                pauses.after(label.polygons.len()).await;
             }
-            if !self.balance_each(&labels, pauses).await {
+            if !self.balance_each(&mut labels, &mut moves, pauses).await {
                 return;
             }
         }
@@ -119,20 +158,20 @@ impl Zone {
     }
 
     /// Runs rounds of giving volume to each label; returns whether any cell may have moved.
-    async fn balance_each(&mut self, labels: &[ThinLabel], pauses: &Pauses) -> bool {
+    async fn balance_each(&mut self, labels: &mut [ThinLabel], moves: &mut Moves, pauses: &Pauses) -> bool {
         let mut before = vec![f64::INFINITY; labels.len()];
         let mut has_moved = false;
         for _ in 0..ROUNDS {
             let mut any = false;
-            for (label, before) in labels.iter().zip(&mut before) {
-                let (missing, sum) = self.missing(label);
+            for (label, before) in labels.iter_mut().zip(&mut before) {
+                let sum = self.missing(label, moves, pauses).await;
                 let most = if before.is_finite() { BALANCED } else { UNBALANCED };
                 if sum.abs() > most * label.voxels && sum.abs() < PROGRESS * *before {
-                    self.give(label, missing, sum as f32);
+                    self.give(label, sum as f32, moves);
                     any = true;
                 }
                 *before = sum.abs();
-                pauses.after(label.polygons.len()).await;
+                pauses.after(label.cells.len() / CELLS_GIVEN).await;
             }
             has_moved |= any;
             if !any {
@@ -143,7 +182,7 @@ impl Zone {
     }
 
     /// Returns the surfaces of labels in the zone, those with fewer voxels per face first.
-    fn thin_labels(&self, nets: &Nets, labels: &[u16]) -> Vec<ThinLabel> {
+    async fn thin_labels(&self, nets: &Nets, labels: &[u16], pauses: &Pauses) -> Vec<ThinLabel> {
         let mut of_label: BTreeMap<u16, Vec<u32>> =
             labels.iter().map(|&number| (number, Vec::new())).collect();
         for (i, polygon) in (0..).zip(&self.polygons) {
@@ -153,28 +192,35 @@ impl Zone {
                 }
             }
         }
-        let all = of_label.iter().map(|(&number, polygons)| self.thin_label(nets, number, polygons));
-        let mut labels: Vec<ThinLabel> = all.collect();
+        let mut local = vec![NONE; nets.cells.slots().len()];
+        let mut labels = Vec::new();
+        for (&number, polygons) in &of_label {
+            pauses.after(polygons.len()).await;
+            labels.push(self.thin_label(nets, number, polygons, &mut local));
+        }
         let thickness = |label: &ThinLabel| label.voxels / label.polygons.len().max(1) as f64;
         labels.sort_by(|a, b| thickness(a).total_cmp(&thickness(b)));
         labels
     }
 
-    fn thin_label(&self, nets: &Nets, number: u16, polygons: &[u32]) -> ThinLabel {
+    /// Returns the surface of one label; `local` has [`NONE`] for each slot, and has so again afterwards.
+    fn thin_label(&self, nets: &Nets, number: u16, polygons: &[u32], local: &mut [u32]) -> ThinLabel {
         let polygons: Vec<Polygon> = polygons.iter().map(|&i| self.polygons[i as usize]).collect();
         let mut cells: Vec<u32> = polygons.iter().flat_map(|polygon| polygon.cells).collect();
         cells.retain(|&i| (i as usize) < self.moving());
         sort_distinct(&mut cells);
-        let local = |i: u32| cells.binary_search(&i).map_or(NONE, |k| k as u32);
-        let of_slot: BTreeMap<u32, u32> = cells.iter().map(|&i| self.slots[i as usize]).zip(0..).collect();
-        let links = (0..).zip(&cells).map(|(k, &i)| {
-            let at = self.at[i as usize];
-            [0, 1, 2, 3, 4, 5].map(|face| {
-                let step = step_to(face);
-                let next = [0, 1, 2].map(|axis| at[axis].wrapping_add_signed(step[axis] as i32));
-                nets.cells.find(next).and_then(|slot| of_slot.get(&slot).copied()).unwrap_or(k)
-            })
-        });
+        let slots: Vec<u32> = cells.iter().map(|&i| self.slots[i as usize]).collect();
+        (0..).zip(&slots).for_each(|(k, &slot)| local[slot as usize] = k);
+        let mut links: Vec<[u32; 6]> = (0..cells.len() as u32).map(|k| [k; 6]).collect();
+        for (k, &slot) in (0..).zip(&slots) {
+            for (axis, before) in nets.cells.before(slot).into_iter().enumerate() {
+                let before = local.get(before as usize).copied().unwrap_or(NONE);
+                if before != NONE {
+                    links[k as usize][2 * axis] = before;
+                    links[before as usize][2 * axis + 1] = k;
+                }
+            }
+        }
         let clear = |i: u32| {
             let cell = nets.cells.get(self.slots[i as usize]);
             let clear = cube_loops()[cell.case(number)].clear[0];
@@ -182,69 +228,104 @@ impl Zone {
         };
         let of_polygon = |polygon: &Polygon| {
             // Gains are those of the label of the lower number.
-            let side = if polygon.labels.iter().all(|&other| other >= number) { 1.0 } else { -1.0 };
-            ThinPolygon {
-                polygon: *polygon,
-                side,
-                clear: polygon.cells.map(clear),
-                cells: polygon.cells.map(local),
-            }
+            let side = if polygon.ordered_labels()[0] == number { 1.0 } else { -1.0 };
+            let cells = polygon.cells.map(|i| local[self.slots[i as usize] as usize]);
+            ThinPolygon { polygon: *polygon, side, clear: polygon.cells.map(clear), cells }
         };
+        let polygons: Vec<ThinPolygon> = polygons.iter().map(of_polygon).collect();
+        slots.iter().for_each(|&slot| local[slot as usize] = NONE);
         ThinLabel {
             number,
             voxels: nets.grid.voxels(number) as f64,
             is_whole: cells.len() == nets.slots_of(number).len(),
             bias: 0.0,
-            polygons: polygons.iter().map(of_polygon).collect(),
-            links: links.collect(),
-            is_pair: cells.iter().map(|&i| pair(nets.cells.get(self.slots[i as usize])).is_some()).collect(),
+            polygons,
+            links,
+            is_pair: slots.iter().map(|&slot| pair(nets.cells.get(slot)).is_some()).collect(),
             cells,
+            measured: Measured::default(),
+            volume: None,
         }
     }
 
-    /// Returns what is missing around each cell of a label, and in sum.
-    fn missing(&self, label: &ThinLabel) -> (Vec<Missing>, f64) {
-        let mut missing = vec![Missing::default(); label.cells.len()];
-        let mut sum = label.bias;
-        for ThinPolygon { polygon, side, clear, cells } in &label.polygons {
-            let mut corners = self.corners(polygon);
-            corners.iter_mut().zip(clear).for_each(|(corner, clear)| corner.1 += *clear);
-            let (gain, area) = gain_of(corners);
-            sum -= f64::from(gain * side);
-            let cells = cells.iter().filter(|&&k| k != NONE);
-            let share = side / cells.clone().count().max(1) as f32;
-            for &k in cells {
-                let found = &mut missing[k as usize];
-                found.amount[0] -= gain * share;
-                found.amount[1] += area.length() * share.abs();
-                found.area += area * share;
-            }
+    /// Returns the volume that a label is missing, and measures what is missing around each of its cells, if they have moved.
+    async fn missing(&self, label: &mut ThinLabel, moves: &Moves, pauses: &Pauses) -> f64 {
+        if moves.any_since(label.measured.at, &label.cells) {
+            label.measured = self.measured(label, moves.now, pauses).await;
         }
-        let size: f32 = missing.iter().map(|found| found.amount[1]).sum();
-        missing.iter_mut().for_each(|found| found.amount[0] += label.bias as f32 * found.amount[1] / size);
-        (missing, sum)
+        label.measured.gains.iter().fold(label.bias, |sum, &gain| sum - f64::from(gain))
+    }
+
+    async fn measured(&self, label: &ThinLabel, now: u32, pauses: &Pauses) -> Measured {
+        let mut gains = Vec::with_capacity(label.polygons.len());
+        let mut missing = vec![Missing::default(); label.cells.len()];
+        for polygons in label.polygons.chunks(POLYGONS) {
+            for four in polygons.chunks(4) {
+                let corners = |thin: &ThinPolygon| {
+                    let mut corners = self.corners(&thin.polygon);
+                    corners.iter_mut().zip(&thin.clear).for_each(|(corner, clear)| corner.1 += *clear);
+                    corners
+                };
+                for (thin, (gain, area, size)) in four.iter().zip(measure_four(four.iter().map(corners))) {
+                    gains.push(gain * thin.side);
+                    let cells = thin.cells.iter().filter(|&&k| k != NONE);
+                    let share = thin.side / cells.clone().count().max(1) as f32;
+                    for &k in cells {
+                        let found = &mut missing[k as usize];
+                        found.amount[0] -= gain * share;
+                        found.amount[1] += size * share.abs();
+                        found.area += area * share;
+                    }
+                }
+            }
+            pauses.after(POLYGONS / POLYGONS_MEASURED).await;
+        }
+        let size = missing.iter().map(|found| found.amount[1]).sum();
+        Measured { at: now, gains, missing, size }
     }
 
     /// Moves cells in which two labels meet outwards, by what is missing nearby, or inwards.
-    fn give(&mut self, label: &ThinLabel, mut missing: Vec<Missing>, sum: f32) {
+    fn give(&mut self, label: &ThinLabel, sum: f32, moves: &mut Moves) {
+        let Measured { missing, size, .. } = &label.measured;
         let outwards: Vec<Vec3> = missing.iter().map(|found| found.area.normalize_or_zero()).collect();
-        for ((found, &i), (outwards, is_pair)) in
-            missing.iter_mut().zip(&label.cells).zip(outwards.iter().zip(&label.is_pair))
+        let mut amounts: Vec<[f32; 2]> = missing.iter().map(|found| found.amount).collect();
+        amounts.iter_mut().for_each(|amount| amount[0] += label.bias as f32 * amount[1] / size);
+        for ((amount, &i), (outwards, is_pair)) in
+            amounts.iter_mut().zip(&label.cells).zip(outwards.iter().zip(&label.is_pair))
         {
             let offset = self.offsets[i as usize];
             let moved = within_reach(offset + *outwards * ROOM.copysign(sum)) - offset;
             if !is_pair || moved.length_squared() < ROOM * ROOM / 4.0 {
-                found.amount[1] = 0.0;
+                amount[1] = 0.0;
             }
         }
-        let can_move: Vec<bool> = missing.iter().map(|found| found.amount[1] > 0.0).collect();
-        let amounts = averaged(missing.iter().map(|found| found.amount).collect(), label.links.iter());
+        let can_move: Vec<bool> = amounts.iter().map(|amount| amount[1] > 0.0).collect();
+        if !can_move.contains(&true) {
+            return;
+        }
+        moves.now += 1;
+        let amounts = averaged(amounts, &label.links);
         for (((&i, outwards), [amount, size]), can_move) in
             label.cells.iter().zip(outwards).zip(amounts).zip(can_move)
         {
             if can_move && size > 0.0 {
                 let shift = outwards * (amount / size).clamp(-MOST, MOST);
                 self.offsets[i as usize] = within_reach(self.offsets[i as usize] + shift);
+                moves.of_cells[i as usize] = moves.now;
+            }
+        }
+    }
+}
+
+impl ThinLabel {
+    /// Returns the volume of the whole surface, measured again if its cells have moved since.
+    async fn volume(&mut self, nets: &Nets, moves: &Moves, pauses: &Pauses) -> f64 {
+        match self.volume {
+            Some((at, volume)) if !moves.any_since(at, &self.cells) => volume,
+            _ => {
+                let volume = nets.volume(self.number, pauses).await;
+                self.volume = Some((moves.now, volume));
+                volume
             }
         }
     }
@@ -263,24 +344,36 @@ impl Nets {
     }
 
     /// Returns the volume of a label's surface, in voxels.
-    pub fn volume(&self, number: u16) -> f64 {
+    pub async fn volume(&self, number: u16, pauses: &Pauses) -> f64 {
         debug_assert_ne!(number, BACKGROUND);
         let slots = self.slots_of(number);
         let Some(&first) = slots.first() else { return 0.0 };
         let origin = self.cells.get(first).at;
         let mut six_volumes = 0.0;
-        for crossing in slots.iter().flat_map(|&slot| self.crossings(slot)) {
-            let Some(far) = crossing.ends.iter().position(|&end| end == number) else { continue };
-            for triangle in self.patch(&crossing, far == 1).triangles() {
-                let [a, b, c] = triangle.each_ref().map(|vertex| {
-                    let vertex = self.coarse.follow(*vertex);
+        for &slot in slots {
+            pauses.after(1).await;
+            for crossing in self.crossings(slot) {
+                let Some(far) = crossing.ends.iter().position(|&end| end == number) else { continue };
+                let position = |vertex: NetVertex| {
                     let shift = match vertex {
                         NetVertex::Cell { slot, .. } => self.coarse.shift(slot),
                         _ => Vec3::ZERO,
                     };
                     (self.position(number, vertex, origin) + shift).as_dvec3()
-                });
-                six_volumes += a.dot(b.cross(c));
+                };
+                let mut known: SmallVec<[(NetVertex, DVec3); 9]> = SmallVec::new();
+                for triangle in self.patch(&crossing, far == 1).triangles() {
+                    let [a, b, c] = triangle.map(|vertex| {
+                        let vertex = self.coarse.follow(vertex);
+                        if let Some(&(_, position)) = known.iter().find(|&&(other, _)| other == vertex) {
+                            return position;
+                        }
+                        let position = position(vertex);
+                        known.push((vertex, position));
+                        position
+                    });
+                    six_volumes += a.dot(b.cross(c));
+                }
             }
         }
         six_volumes / 6.0
