@@ -284,7 +284,7 @@ export class DeformableModel implements Stepper {
 
   /** Current pyramid level: 0 is the volume itself, higher levels are coarser. */
   get level(): number {
-    return this.#handle.use((raw) => raw.level());
+    return this.#use((raw) => raw.level());
   }
 
   /**
@@ -293,12 +293,12 @@ export class DeformableModel implements Stepper {
    * more than twice as long as wide count as several.
    */
   get delta(): number {
-    return this.#handle.use((raw) => raw.delta());
+    return this.#use((raw) => raw.delta());
   }
 
   /** Current values of all parameters; a copy. */
   get params(): Required<DeformableParams> {
-    return this.#handle.use((raw) => raw.params() as Required<DeformableParams>);
+    return this.#use((raw) => raw.params() as Required<DeformableParams>);
   }
 
   /**
@@ -308,7 +308,7 @@ export class DeformableModel implements Stepper {
    */
   setAttractors(attractors: Attractor[]): void {
     const packed = denseCopy('attractors', attractors).flatMap((attractor, index) => numbersOf(attractor, index));
-    this.#handle.use((raw) => raw.setAttractors(Float64Array.from(packed)));
+    this.#use((raw) => raw.setAttractors(Float64Array.from(packed)));
   }
 
   /**
@@ -339,13 +339,27 @@ export class DeformableModel implements Stepper {
   async run(given?: DeformableRunOptions): Promise<StepReport> {
     const { onData, ...run } = checkProperties<DeformableRunOptions>('options', given, RUN_OPTIONS);
     checkListener('onData', onData);
-    try {
-      return await this.#runner.run(() => this.#advance(), run, onData);
-    } catch (error) {
-      // Of a step that is under way, nothing stays.
-      if (run.signal?.aborted && !this.#handle.isFreed) this.#handle.use((raw) => raw.discard());
-      throw error;
-    }
+    return this.#runner.run(
+      () => this.#advance(),
+      run,
+      onData,
+      () => this.#discard(),
+    );
+  }
+
+  /** Gives up the step that is under way: of it, nothing stays. Returns the report of one that has ended. */
+  #discard(): StepReport | undefined {
+    const report = this.#handle.isFreed ? undefined : this.#handle.use((raw) => raw.discard() as Stepped | undefined);
+    return report && this.#taken(report);
+  }
+
+  /** Calls `work` with the model, once a step of a run that is under way has ended and is reported. */
+  #use<T>(work: (raw: RawDeformable) => T): T {
+    this.#runner.settle(() => {
+      const report = this.#handle.use((raw) => raw.settle() as Stepped | undefined);
+      return report && this.#taken(report);
+    });
+    return this.#handle.use(work);
   }
 
   /** Does a slice of a step; returns its report at its end. */
@@ -404,7 +418,7 @@ export class DeformableModel implements Stepper {
     const [first, sizes] = checkedRegion(region);
     const volume = this.#volume;
     if (!volume) throw invalid('refresh', 'not possible with a volume larger than memory');
-    this.#handle.use((raw) => volume.use((voxels) => raw.refresh(voxels, first, sizes)));
+    this.#use((raw) => volume.use((voxels) => raw.refresh(voxels, first, sizes)));
   }
 
   /**
@@ -417,7 +431,7 @@ export class DeformableModel implements Stepper {
   async coverage(given?: CoverageOptions): Promise<Coverage> {
     const { signal, onProgress } = checkedCoverage(given);
     signal?.throwIfAborted();
-    const survey = this.#handle.use((raw) => new Handle('survey', () => raw.surveyCoverage()));
+    const survey = this.#use((raw) => new Handle('survey', () => raw.surveyCoverage()));
     const advance = () => {
       // The survey has its own copy of the surface, but freeing the model must still end it.
       const share = this.#handle.use(() => survey.use((raw) => raw.advance(TRIANGLES_AT_ONCE)));
@@ -442,7 +456,7 @@ export class DeformableModel implements Stepper {
    */
   setParams(params: DeformableParams): void {
     const values = shallowCopy('params', params);
-    this.#handle.use((raw) => raw.setParams(values));
+    this.#use((raw) => raw.setParams(values));
   }
 
   /**
@@ -451,7 +465,7 @@ export class DeformableModel implements Stepper {
    * have 0.
    */
   speeds(): Float32Array {
-    return this.#handle.use((raw) => raw.speeds());
+    return this.#use((raw) => raw.speeds());
   }
 
   /**
@@ -459,7 +473,7 @@ export class DeformableModel implements Stepper {
    * of levels. Of a {@link LargeVolume}, what has been read is not saved: the next step asks for it again.
    */
   save(): Uint8Array {
-    return this.#handle.use((raw) => raw.save());
+    return this.#use((raw) => raw.save());
   }
 
   /**
@@ -471,7 +485,7 @@ export class DeformableModel implements Stepper {
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
-    this.#handle.use((raw) => raw.restore(state));
+    this.#use((raw) => raw.restore(state));
     this.#warnings.forget();
   }
 

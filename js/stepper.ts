@@ -167,6 +167,10 @@ async function withData<T>(work: () => Promise<T>, options: DataOptions): Promis
 /** Runs a model to its end in slices of work, and allows one run of the model at a time. */
 export class Runner {
   #running = false;
+  /** What the run under way does with the report of a step. */
+  #take: ((report: StepReport) => void) | undefined;
+  /** What ends the run that is under way at its next slice. */
+  #failure: { error: unknown } | undefined;
 
   /**
    * Throws `invalid-argument` naming `what` during a run; called by methods of the model that would interfere with one.
@@ -176,34 +180,60 @@ export class Runner {
   }
 
   /**
+   * Has `ended` end a step of the run that is under way, and reports it, before anything else happens to the model; called by
+   * all methods that look at or change it.
+   */
+  settle(ended: () => StepReport | undefined): void {
+    if (!this.#take) return;
+    try {
+      const report = ended();
+      if (report) this.#take(report);
+    } catch (error) {
+      this.#failure = { error };
+    }
+  }
+
+  /**
    * Calls `step`, which returns undefined in the middle of a step, until the model is done, the run is aborted, or
    * `maxIterations` is reached; returns the last report. See {@link RunOptions}. When `step` throws a {@link NeedsDataError}, the data are read, with `onData`, and the run
-   * goes on.
+   * goes on. When it is aborted, `discard` gives up the step that is under way, and returns the report of one that has ended.
    */
   async run(
     step: () => StepReport | undefined,
     given: RunOptions | undefined,
     onData?: DataOptions['onData'],
+    discard?: () => StepReport | undefined,
   ): Promise<StepReport> {
     const { signal, maxIterations = Number.MAX_SAFE_INTEGER, budgetMs, onStep } = checkedRun(given);
     signal?.throwIfAborted();
     this.refuseWhileRunning('run');
     this.#running = true;
     let left = maxIterations;
-    const next = () => {
-      const report = step();
-      if (!report) return undefined;
-      onStep?.(report);
+    let last: StepReport | undefined;
+    const take = (report: StepReport) => {
       left -= 1;
-      return report.done || left === 0 ? report : undefined;
+      if (report.done || left === 0) last = report;
+      onStep?.(report);
+    };
+    [this.#take, this.#failure] = [take, undefined];
+    const next = () => {
+      if (this.#failure) throw this.#failure.error;
+      const report = last ? undefined : step();
+      if (report) take(report);
+      return last;
     };
     try {
       return await withData(() => runInSlices(next, signal, budgetMs), {
         ...(signal && { signal }),
         ...(onData && { onData }),
       });
+    } catch (error) {
+      const ended = signal?.aborted ? discard?.() : undefined;
+      if (ended) onStep?.(ended);
+      throw error;
     } finally {
       this.#running = false;
+      this.#take = undefined;
     }
   }
 }

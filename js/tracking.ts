@@ -271,7 +271,7 @@ export class SurfaceTracker implements Stepper {
 
   /** Index of the frame shown by {@link SurfaceTracker.mesh}, from 0; also 0 before the first frame is done. */
   get frame(): number {
-    return this.#handle.use((raw) => raw.frame());
+    return this.#use((raw) => raw.frame());
   }
 
   /**
@@ -311,15 +311,15 @@ export class SurfaceTracker implements Stepper {
 
   /** Current values of all parameters; a copy. */
   get params(): Required<TrackingParams> {
-    return this.#handle.use((raw) => raw.params() as Required<TrackingParams>);
+    return this.#use((raw) => raw.params() as Required<TrackingParams>);
   }
 
   #statistics(): Statistics {
-    return this.#handle.use((raw) => raw.statistics() as Statistics);
+    return this.#use((raw) => raw.statistics() as Statistics);
   }
 
   #counts(): [number, number, number] {
-    return [...this.#handle.use((raw) => raw.counts())] as [number, number, number];
+    return [...this.#use((raw) => raw.counts())] as [number, number, number];
   }
 
   /**
@@ -346,12 +346,12 @@ export class SurfaceTracker implements Stepper {
    *   and stays usable; any error thrown by `onStep`.
    */
   async run(given?: RunOptions): Promise<StepReport> {
-    try {
-      return await this.#runner.run(() => this.#advance(), given);
-    } catch (error) {
-      if (given?.signal?.aborted) this.#discard();
-      throw error;
-    }
+    return this.#runner.run(
+      () => this.#advance(),
+      given,
+      undefined,
+      () => this.#discard(),
+    );
   }
 
   /** Does a slice of a step; returns its report at its end. */
@@ -360,9 +360,21 @@ export class SurfaceTracker implements Stepper {
     return report && this.#warnings.take(report);
   }
 
-  /** Leaves a step that is under way, unless the tracker was freed. */
-  #discard(): void {
-    if (!this.#handle.isFreed) this.#handle.use((raw) => raw.discard());
+  /** Gives up the step that is under way: of it, nothing stays. Returns the report of one that has ended. */
+  #discard(): StepReport | undefined {
+    const report = this.#handle.isFreed
+      ? undefined
+      : this.#handle.use((raw) => raw.discard() as StepReport | undefined);
+    return report && this.#warnings.take(report);
+  }
+
+  /** Calls `work` with the tracker, once a step of a run that is under way has ended and is reported. */
+  #use<T>(work: (raw: RawTracker) => T): T {
+    this.#runner.settle(() => {
+      const report = this.#handle.use((raw) => raw.settle() as StepReport | undefined);
+      return report && this.#warnings.take(report);
+    });
+    return this.#handle.use(work);
   }
 
   #step(iterations: number): StepReport {
@@ -377,7 +389,7 @@ export class SurfaceTracker implements Stepper {
    */
   setParams(params: TrackingParams): void {
     const values = shallowCopy('params', params);
-    this.#handle.use((raw) => raw.setParams(values));
+    this.#use((raw) => raw.setParams(values));
   }
 
   /**
@@ -392,7 +404,7 @@ export class SurfaceTracker implements Stepper {
   boundary(frame?: number): Float32Array {
     const [frames, bounded] = this.#counts();
     const at = frame === undefined ? Math.max(bounded - 1, 0) : integer('frame', frame, { max: frames - 1 });
-    return this.#handle.use((raw) => raw.boundary(at));
+    return this.#use((raw) => raw.boundary(at));
   }
 
   /**
@@ -407,7 +419,7 @@ export class SurfaceTracker implements Stepper {
     }
     const warnings = this.#warnings.of({ frame });
     return wrapMesh(
-      new Handle('Mesh', () => this.#handle.use((raw) => raw.meshAt(frame) as import('./vesicle.js').RawMesh)),
+      new Handle('Mesh', () => this.#use((raw) => raw.meshAt(frame) as import('./vesicle.js').RawMesh)),
       false,
       () => warnings,
       this.#frame,
@@ -416,7 +428,7 @@ export class SurfaceTracker implements Stepper {
 
   /** Returns the enclosed volume of each frame tracked so far, world units cubed; 0 for those without the object. */
   volumes(): Float64Array {
-    return this.#handle.use((raw) => raw.volumes());
+    return this.#use((raw) => raw.volumes());
   }
 
   /**
@@ -429,7 +441,7 @@ export class SurfaceTracker implements Stepper {
   toGlb(options?: SpaceOptions): Uint8Array {
     const frame = checkedSpaceOptions(checkProperties('options', options, SPACE_OPTIONS), this.#frame, true);
     const seconds = Math.min(Math.max(this.#frameSeconds, 0.001), 1000);
-    return this.#handle.use((raw) => raw.toGlb(seconds, notesOf(this.#warnings.of()), ...frame));
+    return this.#use((raw) => raw.toGlb(seconds, notesOf(this.#warnings.of()), ...frame));
   }
 
   /**
@@ -437,7 +449,7 @@ export class SurfaceTracker implements Stepper {
    * component, cavity and start.
    */
   save(): Uint8Array {
-    return this.#handle.use((raw) => raw.save());
+    return this.#use((raw) => raw.save());
   }
 
   /**
@@ -449,7 +461,7 @@ export class SurfaceTracker implements Stepper {
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
-    this.#handle.use((raw) => raw.restore(state));
+    this.#use((raw) => raw.restore(state));
     this.#warnings.forget();
   }
 

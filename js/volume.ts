@@ -305,6 +305,8 @@ export class Volume {
    */
   inSlices(options?: SliceOptions): VolumeInSlices {
     const { signal, budgetMs } = checkedSlices(options);
+    // Throws if the volume was freed.
+    this.#handle.use(() => undefined);
     return {
       enrichSlices: async (given = {}) => {
         const [factor, byFlow] = enrichment(given);

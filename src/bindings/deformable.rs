@@ -158,9 +158,14 @@ impl RawDeformable {
         self.0.advance().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(report)?))
     }
 
-    /// Gives up the step that is under way.
-    pub fn discard(&self) {
-        self.0.discard();
+    /// Ends the step that is under way; returns the report of a step that has ended since the last slice, else undefined.
+    pub fn settle(&self) -> Result<JsValue, JsValue> {
+        self.0.settle().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(report)?))
+    }
+
+    /// Gives up the step that is under way; returns the report of one that has ended since the last slice, else undefined.
+    pub fn discard(&self) -> Result<JsValue, JsValue> {
+        self.0.discard().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(Ok(report))?))
     }
 
     /// Returns the surface as a live mesh, which changes with the model.

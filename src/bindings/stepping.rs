@@ -67,14 +67,20 @@ impl<M: Sliced> Stepping<M> {
         }
     }
 
-    /// Gives up the step that is under way.
-    pub fn discard(&self) {
-        self.ended.take();
+    /// Ends the step that is under way; returns the report of a step that has ended since the last slice.
+    pub fn settle(&self) -> Option<Result<StepReport, MethodError>> {
+        drop(self.ready());
+        self.ended.take()
+    }
+
+    /// Gives up the step that is under way; returns the report of one that has ended since the last slice.
+    pub fn discard(&self) -> Option<StepReport> {
         let under_way = self.step.borrow_mut().take();
         if under_way.is_some() {
             drop(under_way);
             self.model.borrow_mut().discard_step();
         }
+        self.ended.take().and_then(Result::ok)
     }
 }
 

@@ -201,9 +201,15 @@ impl RawTracker {
         report.map_or(Ok(JsValue::UNDEFINED), |report| Ok(to_js(&report)?))
     }
 
-    /// Ends the step that is under way without its result.
-    pub fn discard(&self) {
-        self.0.discard();
+    /// Ends the step that is under way; returns the report of a step that has ended since the last slice, else undefined.
+    pub fn settle(&self) -> Result<JsValue, JsValue> {
+        let report = self.0.settle().transpose().map_err(Failure::from)?;
+        report.map_or(Ok(JsValue::UNDEFINED), |report| Ok(to_js(&report)?))
+    }
+
+    /// Gives up the step that is under way; returns the report of one that has ended since the last slice, else undefined.
+    pub fn discard(&self) -> Result<JsValue, JsValue> {
+        self.0.discard().map_or(Ok(JsValue::UNDEFINED), |report| Ok(to_js(&report)?))
     }
 
     /// Returns the current values of all parameters, as a plain object.

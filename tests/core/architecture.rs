@@ -13,7 +13,7 @@ const ALLOWED: [(&str, &[&str]); 10] = [
     ("math", &[]),
     ("mesh", &["math"]),
     ("spatial", &["math", "mesh", "pauses"]),
-    ("volume", &["math", "mesh", "warning"]),
+    ("volume", &["math", "mesh", "pauses", "warning"]),
     ("io", &["math", "mesh", "volume", "warning"]),
     ("voxelise", &["math", "mesh", "spatial", "volume"]),
     ("remesh", &["math", "mesh", "pauses", "spatial", "volume"]),

@@ -623,6 +623,33 @@ test('a run yields within steps: an abort leaves the model as after the last ste
   expect(withinSteps).toBeGreaterThan(2);
 });
 
+test('a step that ends because of a call is reported before the call, and when the run is aborted', async () => {
+  const make = () => new DeformableModel({ volume: noise(14, 8), params: { smallestPart: 0 } });
+  const [sliced, again] = [make(), make()];
+  const log: ('step' | number)[] = [];
+  const stop = new AbortController();
+  const run = sliced.run({ signal: stop.signal, budgetMs: 1e-6, onStep: () => log.push('step') });
+  for (let k = 1; k <= 8; k++) {
+    await new Promise((resolve) => setImmediate(resolve));
+    // Ends a step, too, as reading the surface does.
+    if (k % 2 === 0) sliced.mesh.info();
+    sliced.setParams({ rigidity: k / 10 });
+    log.push(k / 10);
+  }
+  await new Promise((resolve) => setImmediate(resolve));
+  sliced.mesh.info();
+  const before = log.length;
+  stop.abort('enough');
+  await expect(run).rejects.toBe('enough');
+  expect(log.slice(before)).toEqual(['step']);
+  for (const entry of log) {
+    if (entry === 'step') again.step();
+    else again.setParams({ rigidity: entry });
+  }
+  expect(log.filter((entry) => entry === 'step').length).toBeGreaterThan(4);
+  expect(Buffer.from(sliced.save()).equals(Buffer.from(again.save()))).toBe(true);
+});
+
 test('what is asked of a model in the middle of a step ends the step first', async () => {
   const make = () => new DeformableModel({ volume: noise(14, 8), params: { smallestPart: 0 } });
   const [whole, sliced] = [make(), make()];
