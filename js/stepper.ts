@@ -167,9 +167,9 @@ async function withData<T>(work: () => Promise<T>, options: DataOptions): Promis
 /** Runs a model to its end in slices of work, and allows one run of the model at a time. */
 export class Runner {
   #running = false;
-  /** What the run under way does with the report of a step. */
+  /** Takes the report of a step of the run that is under way. */
   #take: ((report: StepReport) => void) | undefined;
-  /** What ends the run that is under way at its next slice. */
+  /** The error that ends the run at its next slice. */
   #failure: { error: unknown } | undefined;
 
   /**
