@@ -108,6 +108,8 @@ describe('running', () => {
     await app.page.locator('.scene > canvas').focus();
     await app.page.keyboard.press(' ');
     await reach(app.page, 'running');
+    // A pause gives up the step that is under way.
+    await expect.poll(() => iteration(app.page)).toBeGreaterThan(11);
     await app.page.keyboard.press(' ');
     await reach(app.page, 'paused');
     expect(await iteration(app.page)).toBeGreaterThan(11);
