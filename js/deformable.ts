@@ -331,7 +331,8 @@ export class DeformableModel implements Stepper {
    * {@link LargeVolume}, steps are not interrupted.
    *
    * @returns The last report.
-   * @throws `signal.reason` when aborted, and the model is as after the last step that ended, and stays usable; any error thrown by `onStep` or `onData`;
+   * @throws `signal.reason` when aborted, and the model is as after the last step that ended, and stays usable; any error
+   *   thrown by `onStep` or `onData`;
    *   {@link VesicleError} `invalid-argument` while another run is in progress, `freed` when the model is freed
    *   meanwhile; those of reading a {@link LargeVolume}, such as `unavailable`: the model stays usable, and another run
    *   continues.

@@ -304,6 +304,11 @@ impl BoxMap {
         p / self.scale + self.centre
     }
 
+    /// Returns positions in world units, from those in the normalised box.
+    pub fn all_in_world<'a>(&self, points: impl IntoIterator<Item = &'a Vec3>) -> Vec<Vec3> {
+        points.into_iter().map(|p| self.in_world(p.as_dvec3()).as_vec3()).collect()
+    }
+
     /// Returns the map from world units into the normalised box as an affine transformation, for cameras.
     pub fn affine(&self) -> DAffine3 {
         DAffine3::from_scale(DVec3::splat(self.scale)) * DAffine3::from_translation(-self.centre)

@@ -552,7 +552,7 @@ impl ImplicitSurface {
 
     fn begin_extraction(&self) -> Result<Stage, MethodError> {
         let Some(solved) = &self.solved else { return Ok(first_stage(&self.options)) };
-        let points = self.in_world(&self.constraints.centres[..self.constraints.surface]);
+        let points = self.map.all_in_world(&self.constraints.centres[..self.constraints.surface]);
         let level = self.iso_value(solved);
         let extraction = Extraction::new(
             &solved.field,
@@ -563,10 +563,6 @@ impl ImplicitSurface {
             self.sides == Some(Sides::Outside),
         )?;
         Ok(Stage::Extract(Box::new(extraction)))
-    }
-
-    fn in_world(&self, points: &[Vec3]) -> Vec<Vec3> {
-        points.iter().map(|p| self.map.in_world(p.as_dvec3()).as_vec3()).collect()
     }
 
     /// Returns the iso-value of the implicit function f, chosen by the parameter `level`, at which the surface is

@@ -44,7 +44,7 @@ impl ImplicitSurface {
         [0.0, -1.0, 1.0].map(|value| {
             let chosen: Vec<Vec3> =
                 all.clone().filter(|&(_, &other)| other == value).map(|(&p, _)| p).collect();
-            self.in_world(&chosen)
+            self.map.all_in_world(&chosen)
         })
     }
 

@@ -14,7 +14,6 @@ use super::params::{ImplicitParams, Sides};
 use super::sampling::Samples;
 use super::solve::{Constraints, Solver};
 use super::{SEED, Solved};
-use crate::math::Vec3;
 
 /// Root mean square distance of the points from the surface with constraints outside only, relative to that with both sides,
 /// below which the former is taken.
@@ -97,7 +96,7 @@ impl Attempt {
                 Ok(None) => Some(Self::Extract(extraction)),
                 Ok(Some(mesh)) => {
                     let step = samples.cloud.len().div_ceil(MEASURED);
-                    let points: Vec<Vec3> = in_world(samples.cloud.points.iter().step_by(step), map);
+                    let points = map.all_in_world(samples.cloud.points.iter().step_by(step));
                     Fitness::of(&points, &mesh).ok().map(|fitness| Self::Done(fitness.rms))
                 }
                 Err(_) => None,
@@ -114,7 +113,7 @@ impl Attempt {
         map: &BoxMap,
     ) -> Option<Self> {
         let solved = Solved::new(solver.kernel(), constraints.centres.clone(), solver.solution()?, 0.0);
-        let points = in_world(samples.cloud.points.iter(), map);
+        let points = map.all_in_world(&samples.cloud.points);
         let cell = COARSER * default_cell(map, samples.spacing);
         let extraction = Extraction::new(&solved.field, *map, 0.0, &points, cell, false).ok()?;
         Some(Self::Extract(Box::new(extraction)))
@@ -127,8 +126,4 @@ impl Attempt {
             Self::Done(_) => 1.0,
         }
     }
-}
-
-fn in_world<'a>(points: impl Iterator<Item = &'a Vec3>, map: &BoxMap) -> Vec<Vec3> {
-    points.map(|p| map.in_world(p.as_dvec3()).as_vec3()).collect()
 }
