@@ -3,9 +3,12 @@
 
 use std::cell::Cell;
 use std::future::{Future, poll_fn};
-use std::pin::pin;
+use std::pin::{Pin, pin};
 use std::rc::Rc;
 use std::task::{Context, Poll, Waker};
+
+/// A computation that may pause, kept between its slices.
+pub type Computation<T> = Pin<Box<dyn Future<Output = T>>>;
 
 /// Units of work of a slice; a unit takes some microseconds.
 const SLICE: u32 = 500;
@@ -52,7 +55,7 @@ async fn pause() {
 
 /// Runs a computation up to its next pause, or its end.
 pub fn advance<F: Future + Unpin + ?Sized>(computation: &mut F) -> Poll<F::Output> {
-    std::pin::Pin::new(computation).poll(&mut Context::from_waker(Waker::noop()))
+    Pin::new(computation).poll(&mut Context::from_waker(Waker::noop()))
 }
 
 /// Runs a computation to its end.

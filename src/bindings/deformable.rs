@@ -13,14 +13,14 @@ use super::convert::{doubles, to_js, with_overrides, world_points};
 use super::error::Failure;
 use super::mesh::RawMesh;
 use super::method::{method_bindings, reported};
-use super::stepping::{Computation, LiveStepping, Sliced, Stepping};
+use super::stepping::{LiveStepping, Sliced, Stepping};
 use super::volume::RawVolume;
 use vesicle::math::DVec3;
 use vesicle::methods::deformable::{
     Attractor, Coverage, CoverageSurvey, DeformableModel, DeformableOptions, DeformableParams, Missing, Start,
 };
 use vesicle::methods::{MethodError, StepReport};
-use vesicle::pauses::advance;
+use vesicle::pauses::{Computation, advance};
 
 /// The raw handle of a start surface, from which a deformable model begins.
 #[wasm_bindgen]

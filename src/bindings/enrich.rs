@@ -1,14 +1,12 @@
 //! Bindings of the interpolation of slices.
 
-use std::future::Future;
-use std::pin::Pin;
 use std::task::Poll;
 
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::error::Failure;
 use super::volume::RawVolume;
-use vesicle::pauses::{Pauses, advance};
+use vesicle::pauses::{Computation, Pauses, advance};
 use vesicle::volume::{Enrichment, Volume, VolumeError};
 
 #[wasm_bindgen]
@@ -33,7 +31,7 @@ impl RawVolume {
 
 /// A volume in which slices are being interpolated.
 #[wasm_bindgen]
-pub struct RawEnrichment(Pin<Box<dyn Future<Output = Result<Volume, VolumeError>>>>);
+pub struct RawEnrichment(Computation<Result<Volume, VolumeError>>);
 
 #[wasm_bindgen]
 impl RawEnrichment {

@@ -1,8 +1,6 @@
 //! Bindings of the surfaces of a label map.
 
 use std::cell::RefCell;
-use std::future::Future;
-use std::pin::Pin;
 use std::rc::Rc;
 use std::task::Poll;
 
@@ -19,9 +17,7 @@ use vesicle::math::DVec3;
 use vesicle::mesh::TriangleMesh;
 use vesicle::methods::label_surfaces::{LabelParams, LabelSurfaces};
 use vesicle::methods::{LiveSurface, Method, MethodError, StepReport};
-use vesicle::pauses::{advance, finished};
-
-type Computation<T> = Pin<Box<dyn Future<Output = T>>>;
+use vesicle::pauses::{Computation, advance, finished};
 type Stepped = (LabelSurfaces, Result<StepReport, MethodError>);
 
 /// Surfaces, of which a step may be under way: whatever is asked of them then ends it first, so that a step changes all or

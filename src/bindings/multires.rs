@@ -1,8 +1,6 @@
 //! Bindings of the multiresolution model.
 
 use std::cell::{RefCell, RefMut};
-use std::future::Future;
-use std::pin::Pin;
 use std::rc::Rc;
 use std::task::Poll;
 
@@ -20,7 +18,7 @@ use vesicle::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, Support,
 };
 use vesicle::methods::{LiveSurface, MethodError};
-use vesicle::pauses::advance;
+use vesicle::pauses::{Computation, advance};
 
 /// Returns the options of a model; properties of `params` replace the default parameters.
 fn options(
@@ -41,7 +39,7 @@ fn options(
 
 /// A model that is being created in slices.
 #[wasm_bindgen]
-pub struct RawMultiresCreation(Pin<Box<dyn Future<Output = Result<MultiresolutionModel, MethodError>>>>);
+pub struct RawMultiresCreation(Computation<Result<MultiresolutionModel, MethodError>>);
 
 #[wasm_bindgen]
 impl RawMultiresCreation {

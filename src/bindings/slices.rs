@@ -1,7 +1,5 @@
 //! Bindings of long operations on meshes in slices of work.
 
-use std::future::Future;
-use std::pin::Pin;
 use std::rc::Rc;
 use std::task::Poll;
 
@@ -11,7 +9,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::error::Failure;
 use super::mesh::{MeshKind, RawMesh, distances, edge_bounds, editable_copy, passes_of, read_only};
 use vesicle::mesh::Mesh;
-use vesicle::pauses::{Pauses, advance};
+use vesicle::pauses::{Computation, Pauses, advance};
 use vesicle::remesh::{
     Smoothing, decimate_in_slices, decimate_within_in_slices, passes_in_slices, remesh_in_slices,
     smooth_in_slices,
@@ -26,7 +24,7 @@ struct Done {
 
 /// An operation on a mesh that is under way, on a copy.
 #[wasm_bindgen]
-pub struct RawMeshWork(Pin<Box<dyn Future<Output = Result<Done, Failure>>>>);
+pub struct RawMeshWork(Computation<Result<Done, Failure>>);
 
 #[wasm_bindgen]
 impl RawMeshWork {

@@ -2,18 +2,15 @@
 
 use std::cell::{RefCell, RefMut};
 use std::future::Future;
-use std::pin::Pin;
 use std::rc::Rc;
 use std::task::Poll;
 
 use vesicle::math::DVec3;
 use vesicle::mesh::TriangleMesh;
 use vesicle::methods::{LiveSurface, Method, MethodError, StepReport};
-use vesicle::pauses::{advance, finished};
+use vesicle::pauses::{Computation, advance, finished};
 
 use super::convert::now;
-
-pub type Computation<T> = Pin<Box<dyn Future<Output = T>>>;
 
 /// A method whose steps go in slices.
 pub trait Sliced: Method + 'static {

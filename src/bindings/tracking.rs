@@ -13,7 +13,7 @@ use super::convert::{bytes, doubles, to_js, with_overrides, write_options};
 use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method;
-use super::stepping::{Computation, LiveStepping, Sliced, Stepping};
+use super::stepping::{LiveStepping, Sliced, Stepping};
 use super::volume::RawVolume;
 use vesicle::io::AnimationWriter;
 use vesicle::math::DVec3;
@@ -22,7 +22,7 @@ use vesicle::methods::tracking::{
     TrackingParams,
 };
 use vesicle::methods::{Method, MethodError, StepReport};
-use vesicle::pauses::advance;
+use vesicle::pauses::{Computation, advance};
 
 impl Sliced for SurfaceTracker {
     fn step_in_slices(&mut self) -> impl Future<Output = Result<StepReport, MethodError>> {
