@@ -138,10 +138,53 @@ impl CellBox {
         union
     }
 
+    /// Returns the rows of the box along x, in the order of z and y.
+    pub fn rows(&self) -> impl Iterator<Item = Self> + use<> {
+        let Self { low, high } = *self;
+        let row = move |y, z| Self { low: [low[0], y, z], high: [high[0], y, z] };
+        (low[2]..=high[2]).flat_map(move |z| (low[1]..=high[1]).map(move |y| row(y, z)))
+    }
+
     /// Returns whether the box contains a cell.
     pub fn contains(&self, at: [u32; 3]) -> bool {
         (0..3).all(|axis| self.low[axis] <= at[axis] && at[axis] <= self.high[axis])
     }
+}
+
+/// A row of cells along x, as the four rows of voxels around it.
+struct RowOfCells<'a>([&'a [u16]; 4]);
+
+impl<'a> RowOfCells<'a> {
+    fn new(grid: &'a LabelGrid, row: &CellBox) -> Self {
+        let width = grid.dims()[0] + 2;
+        let layer = width * (grid.dims()[1] + 2);
+        let [first, y, z] = row.low.map(|n| n as usize);
+        let (start, size) = (first + width * y + layer * z, row.high[0] as usize - first + 2);
+        Self([0, width, layer, width + layer].map(|offset| &grid.numbers()[start + offset..][..size]))
+    }
+
+    /// Returns whether all voxels have one label: most rows of most label maps have nothing in them.
+    fn is_uniform(&self) -> bool {
+        let Self(rows) = self;
+        rows.iter().all(|row| row.iter().all(|&number| number == rows[0][0]))
+    }
+
+    /// Returns, for each cell, whether its corners have different labels.
+    fn crossed(&self) -> impl Iterator<Item = bool> + '_ {
+        let Self([a, b, c, d]) = *self;
+        let is_uniform = move |i: usize| a[i] == b[i] && a[i] == c[i] && a[i] == d[i];
+        let mut before = is_uniform(0);
+        (1..a.len()).map(move |i| {
+            let here = is_uniform(i);
+            !(here && std::mem::replace(&mut before, here) && a[i] == a[i - 1])
+        })
+    }
+}
+
+/// Returns the number of cells of a box that surfaces of `grid` pass through.
+pub fn count_cells(grid: &LabelGrid, area: &CellBox) -> usize {
+    let rows = area.rows().map(|row| RowOfCells::new(grid, &row));
+    rows.filter(|row| !row.is_uniform()).map(|row| row.crossed().filter(|&is_crossed| is_crossed).count()).sum()
 }
 
 /// All cells through which surfaces pass, each in a slot that it keeps as long as it is stored.
@@ -319,6 +362,16 @@ impl Cells {
         self.slots[block].iter().map(|&slot| (slot != NONE).then_some(slot))
     }
 
+    /// Reserves memory for a number of cells.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub fn reserve(&mut self, cells: usize) -> Result<(), VolumeError> {
+        let bytes = (cells * (size_of::<Cell>() + size_of::<[u32; 3]>())) as u64;
+        self.list.try_reserve_exact(cells).map_err(|_| VolumeError::TooLarge { bytes })?;
+        self.before.try_reserve_exact(cells).map_err(|_| VolumeError::TooLarge { bytes })
+    }
+
     /// Stores, changes or frees the cells of a box so that they are those through which the surfaces of `grid` pass; sets
     /// the flag in `changed` of each label, by number, that is in a cell that has changed, or was.
     ///
@@ -330,54 +383,36 @@ impl Cells {
         area: CellBox,
         changed: &mut [bool],
     ) -> Result<(), VolumeError> {
-        let width = grid.dims()[0] + 2;
-        let layer = width * (grid.dims()[1] + 2);
-        let numbers = grid.numbers();
-        let (first, last) = (area.low[0] as usize, area.high[0] as usize);
-        for z in area.low[2]..=area.high[2] {
-            for y in area.low[1]..=area.high[1] {
-                let start = width * y as usize + layer * z as usize;
-                let rows = [start, start + width, start + layer, start + width + layer]
-                    .map(|start| &numbers[start + first..start + last + 2]);
-                let row = CellBox { low: [area.low[0], y, z], high: [area.high[0], y, z] };
-                // Most rows of most label maps have nothing in them.
-                let is_uniform = rows.iter().all(|row| row.iter().all(|&number| number == rows[0][0]));
-                if !is_uniform || !self.within(&row).is_empty() {
-                    self.update_row(grid, row.low, rows, changed)?;
-                }
+        for row in area.rows() {
+            let around = RowOfCells::new(grid, &row);
+            if !around.is_uniform() || !self.within(&row).is_empty() {
+                self.update_row(grid, row.low, &around, changed)?;
             }
         }
         Ok(())
     }
 
-    /// Updates a row of cells from `at` on; `rows` are the four rows of voxels around it.
+    /// Updates a row of cells from `at` on, between the voxels `around` it.
     fn update_row(
         &mut self,
         grid: &LabelGrid,
         at: [u32; 3],
-        rows: [&[u16]; 4],
+        around: &RowOfCells<'_>,
         changed: &mut [bool],
     ) -> Result<(), VolumeError> {
-        let [a, b, c, d] = rows;
-        let mut before = true;
-        for i in 0..a.len() {
-            let uniform = a[i] == b[i] && a[i] == c[i] && a[i] == d[i];
-            if i > 0 {
-                let crossed = !(uniform && before && a[i] == a[i - 1]);
-                let cell = [at[0] + i as u32 - 1, at[1], at[2]];
-                let known = self.find(cell);
-                let corners = if crossed { grid.corners(cell) } else { [BACKGROUND; 8] };
-                let before = known.map_or([BACKGROUND; 8], |slot| self.get(slot).corners);
-                if corners != before {
-                    before.iter().chain(&corners).for_each(|&number| changed[usize::from(number)] = true);
-                }
-                if crossed {
-                    self.store(cell, corners)?;
-                } else if let Some(slot) = known {
-                    self.remove(cell, slot);
-                }
+        for (x, is_crossed) in (at[0]..).zip(around.crossed()) {
+            let cell = [x, at[1], at[2]];
+            let known = self.find(cell);
+            let corners = if is_crossed { grid.corners(cell) } else { [BACKGROUND; 8] };
+            let before = known.map_or([BACKGROUND; 8], |slot| self.get(slot).corners);
+            if corners != before {
+                before.iter().chain(&corners).for_each(|&number| changed[usize::from(number)] = true);
             }
-            before = uniform;
+            if is_crossed {
+                self.store(cell, corners)?;
+            } else if let Some(slot) = known {
+                self.remove(cell, slot);
+            }
         }
         Ok(())
     }

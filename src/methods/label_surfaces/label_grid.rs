@@ -43,7 +43,10 @@ impl LabelGrid {
         numbers.resize(dims.iter().map(|n| n + 2).product(), BACKGROUND);
         let (values, by_rank, voxels) = Default::default();
         let mut grid = Self { dims, numbers, values, by_rank, voxels, wanted: wanted.map(sorted) };
-        grid.read(volume, Region { min: [0; 3], dims })?;
+        // By layers, as reading needs memory for a copy.
+        for z in 0..dims[2] {
+            grid.read(volume, Region { min: [0, 0, z], dims: [dims[0], dims[1], 1] })?;
+        }
         Ok(grid)
     }
 

@@ -8,7 +8,7 @@
 //! vertex on the edge of the grid instead of by a diagonal. So they are between two cells in which labels meet like in a
 //! saddle, where vertices in the cells alone leave no gap.
 
-use super::cells::{Cell, CellBox, Cells};
+use super::cells::{Cell, CellBox, Cells, count_cells};
 use super::coarsen::Coarsening;
 use super::cube_loops::{FAR, corner_offset, cube_loops, edge_at, face};
 use super::label_grid::{BACKGROUND, LabelGrid};
@@ -22,8 +22,8 @@ use crate::volume::VolumeError;
 /// Largest number of cells through which surfaces pass; more take more than a gigabyte. Labels of noise have as many in 200³
 /// voxels.
 const MOST_CELLS: usize = 8_000_000;
-/// Work that a layer of voxels counts as, whatever is in it.
-const LAYER_WORK: usize = 50;
+/// Work that a row of voxels counts as, whatever is in it.
+const WORK_OF_ROW: usize = 1;
 /// Work that finding and storing a cell counts as.
 const WORK_OF_CELL: usize = 2;
 
@@ -124,12 +124,22 @@ impl Nets {
         let mut nets = Self { cells, coarse, of_labels, grid, to_world, origin, rounding };
         let everywhere = nets.everywhere();
         let mut changed = nets.no_labels();
-        for z in everywhere.low[2]..=everywhere.high[2] {
-            let [mut low, mut high] = [everywhere.low, everywhere.high];
-            (low[2], high[2]) = (z, z);
+        // Counted first, so that what is refused needs no memory.
+        nets.cells.reserve(nets.counted(pauses).await?)?;
+        for row in everywhere.rows() {
             let before = nets.cells.slots().len();
-            nets.cells.update(&nets.grid, CellBox { low, high }, &mut changed)?;
-            let cells = nets.cells.slots().len();
+            nets.cells.update(&nets.grid, row, &mut changed)?;
+            pauses.after(WORK_OF_CELL * (nets.cells.slots().len() - before) + WORK_OF_ROW).await;
+        }
+        nets.list(everywhere, &changed, pauses).await;
+        Ok(nets)
+    }
+
+    /// Returns the number of cells through which surfaces pass.
+    async fn counted(&self, pauses: &Pauses) -> Result<usize, MethodError> {
+        let mut cells = 0;
+        for row in self.everywhere().rows() {
+            cells += count_cells(&self.grid, &row);
             if cells > MOST_CELLS {
                 let problem = format!(
                     "the surfaces of its labels pass through more than {MOST_CELLS} cells of its grid: choose some labels, or \
@@ -137,10 +147,9 @@ impl Nets {
                 );
                 return Err(MethodError::invalid("volume", problem));
             }
-            pauses.after(WORK_OF_CELL * (cells - before) + LAYER_WORK).await;
+            pauses.after(WORK_OF_ROW).await;
         }
-        nets.list(everywhere, &changed, pauses).await;
-        Ok(nets)
+        Ok(cells)
     }
 
     /// Has the cells of a box follow the labels; returns a flag for each label, by number, whether it is in a cell that
