@@ -39,7 +39,7 @@ import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
 // Entry points without readers of files lack `RawMeshFile`, which an import by name would demand.
 import * as glue from './vesicle.js';
-import { type RawArrays, RawExtra, RawMesh, type RawMeshWork } from './vesicle.js';
+import { type RawArrays, RawExtra, RawMesh, type RawMeshWork, type RawVolume } from './vesicle.js';
 import { type Volume, volumeHandle, withWarnings, wrapVolume } from './volume.js';
 import type { Warning } from './warning.js';
 import { checkedWarnings, mergedWarnings, notesOf, recentred } from './warnings.js';
@@ -201,6 +201,10 @@ export interface MeshInSlices {
   decimateWithin(maxDistance: number, options?: { targetTriangles?: number }): Promise<void>;
   /** As {@link Mesh.smooth}. */
   smooth(options: { iterations: number; keepVolume?: boolean }): Promise<void>;
+  /** As {@link Mesh.toVolume}, for the surface as it is when it is called. */
+  toVolume(like: Volume, options?: { kind?: VoxelKind; value?: number }): Promise<Volume>;
+  /** As {@link Mesh.check}, for the surface as it is when it is called. */
+  check(): Promise<MeshReport>;
   /** As {@link Mesh.distanceTo}, for the two surfaces as they are when it is called. */
   distanceTo(other: Mesh): Promise<SurfaceDistance>;
 }
@@ -695,10 +699,7 @@ export class Mesh {
    *   `too-large`.
    */
   toVolume(like: Volume, options: { kind?: VoxelKind; value?: number } = {}): Volume {
-    const { kind = 'mask', value } = checkProperties('options', options, ['kind', 'value']);
-    choice('kind', kind, VOXEL_KINDS);
-    if (value !== undefined && kind !== 'mask') throw invalid('value', `only a mask has a value, not a ${kind} volume`);
-    const inside = integer('value', value ?? 1, { min: 1 });
+    const [kind, inside] = voxelQuantity(options);
     const handle = volumeHandle('like', like);
     const { warnings } = this;
     return wrapVolume(() =>
@@ -862,6 +863,15 @@ export class Mesh {
         const [count, keepVolume] = smoothing(options);
         return change('smooth', (raw) => raw.smoothInSlices(count, keepVolume));
       },
+      toVolume: async (like, options = {}) => {
+        const [kind, inside] = voxelQuantity(options);
+        const handle = volumeHandle('like', like);
+        const { warnings } = this;
+        const begin = (raw: RawMesh) => handle.use((grid) => raw.toVolumeInSlices(grid, kind, inside));
+        const made = await this.#work<RawVolume>(begin, slices);
+        return wrapVolume(() => withWarnings(made, warnings));
+      },
+      check: async () => this.#work((raw) => raw.checkInSlices(), slices),
       distanceTo: async (other) => {
         const handle = meshHandle('other', other);
         return this.#work((raw) => handle.use((rawOther) => raw.distanceToInSlices(rawOther)), slices);
@@ -940,6 +950,14 @@ function triple(numbers: Float64Array): Vec3 {
 function passCodes(passes: readonly RestructurePass[]): Uint8Array {
   const code = (pass: RestructurePass) => RESTRUCTURE_PASSES.indexOf(choice('passes', pass, RESTRUCTURE_PASSES));
   return Uint8Array.from(denseCopy('passes', passes).map(code));
+}
+
+/** Returns the quantity that {@link Mesh.toVolume} is asked for, and the value inside a mask, once they are checked. */
+function voxelQuantity(options: { kind?: VoxelKind; value?: number }): [VoxelKind, number] {
+  const { kind = 'mask', value } = checkProperties('options', options, ['kind', 'value']);
+  choice('kind', kind, VOXEL_KINDS);
+  if (value !== undefined && kind !== 'mask') throw invalid('value', `only a mask has a value, not a ${kind} volume`);
+  return [kind, integer('value', value ?? 1, { min: 1 })];
 }
 
 /** Returns the options of {@link Mesh.smooth} once they are checked. */

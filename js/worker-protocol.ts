@@ -218,6 +218,8 @@ export const SLICED: { Mesh: Names<keyof MeshInSlices>; Volume: Names<keyof Volu
     decimate: 'method',
     decimateWithin: 'method',
     smooth: 'method',
+    toVolume: 'method',
+    check: 'method',
     distanceTo: 'method',
   },
   Volume: { enrichSlices: 'method' },

@@ -505,7 +505,7 @@ impl Hit {
 
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
-struct Report {
+pub(super) struct Report {
     closed: bool,
     oriented: bool,
     non_manifold_edges: usize,

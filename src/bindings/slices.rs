@@ -6,15 +6,19 @@ use std::task::Poll;
 use js_sys::Array;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
+use super::convert::to_js;
 use super::error::Failure;
-use super::mesh::{MeshKind, RawMesh, distances, edge_bounds, editable_copy, passes_of, read_only};
-use vesicle::mesh::Mesh;
+use super::mesh::{MeshKind, RawMesh, Report, distances, edge_bounds, editable_copy, passes_of, read_only};
+use super::volume::RawVolume;
+use super::voxelise::kind_of;
+use vesicle::mesh::{Mesh, report_in_slices};
 use vesicle::pauses::{Computation, Pauses, advance};
 use vesicle::remesh::{
     Smoothing, decimate_in_slices, decimate_within_in_slices, passes_in_slices, remesh_in_slices,
     smooth_in_slices,
 };
 use vesicle::spatial::surface_distance_in_slices;
+use vesicle::voxelise::voxelise_in_slices;
 
 /// The results of an operation: the changed mesh, if it is changed, and the value that is returned.
 struct Done {
@@ -151,6 +155,31 @@ impl RawMesh {
             smooth_in_slices(mesh, smoothing, pauses).await?;
             Ok(JsValue::UNDEFINED)
         })
+    }
+
+    /// Begins what `toVolume` does, of the surface as it is now; the value is the `RawVolume`.
+    #[wasm_bindgen(js_name = toVolumeInSlices)]
+    pub fn to_volume_in_slices(
+        &self,
+        like: &RawVolume,
+        kind: &str,
+        value: u32,
+    ) -> Result<RawMeshWork, JsValue> {
+        let (mesh, like, kind) = (self.triangles(), like.0.clone(), kind_of(kind, value)?);
+        Ok(RawMeshWork(Box::pin(async move {
+            let volume = voxelise_in_slices(&mesh, &like, kind, &Pauses::default()).await?;
+            Ok(Done { mesh: None, value: RawVolume(volume).into() })
+        })))
+    }
+
+    /// Begins what `check` does, of the surface as it is now; the value is a `MeshReport`.
+    #[wasm_bindgen(js_name = checkInSlices)]
+    pub fn check_in_slices(&self) -> RawMeshWork {
+        let mesh = self.triangles();
+        RawMeshWork(Box::pin(async move {
+            let report = report_in_slices(&mesh, &Pauses::default()).await?;
+            Ok(Done { mesh: None, value: to_js(&Report::from(report))? })
+        }))
     }
 
     /// Begins what `distanceTo` does, between the two surfaces as they are now; the value is a `SurfaceDistance`.

@@ -13,18 +13,22 @@ use vesicle::remesh::{Smoothing, decimate_within, smooth};
 use vesicle::spatial::contains;
 use vesicle::voxelise::{VoxelKind, voxelise};
 
+pub(super) fn kind_of(name: &str, value: u32) -> Result<VoxelKind, Failure> {
+    match name {
+        "mask" => Ok(VoxelKind::Mask { value }),
+        "coverage" => Ok(VoxelKind::Coverage),
+        "distance" => Ok(VoxelKind::Distance),
+        _ => Err(Failure::invalid("kind", "must be one of mask, coverage, distance")),
+    }
+}
+
 #[wasm_bindgen]
 impl RawMesh {
     /// Returns a volume on the grid of `like`: `kind` is mask (of intensity `value` inside), coverage or distance; see
     /// [`voxelise`].
     #[wasm_bindgen(js_name = toVolume)]
     pub fn to_volume(&self, like: &RawVolume, kind: &str, value: u32) -> Result<RawVolume, JsValue> {
-        let kind = match kind {
-            "mask" => VoxelKind::Mask { value },
-            "coverage" => VoxelKind::Coverage,
-            "distance" => VoxelKind::Distance,
-            _ => return Err(Failure::invalid("kind", "must be one of mask, coverage, distance").into()),
-        };
+        let kind = kind_of(kind, value)?;
         Ok(RawVolume(voxelise(&self.triangles(), &like.0, kind).map_err(Failure::from)?))
     }
 

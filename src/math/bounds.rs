@@ -195,25 +195,13 @@ impl BoxTree {
                 goes_on.set(visit(a, b));
             }
         };
-        let mut stack = Vec::new();
-        if !self.nodes.is_empty() {
-            stack.push((0, 0));
-        }
-        while let Some((i, j)) = stack.pop().filter(|_| goes_on.get()) {
-            let (a, b) = (&self.nodes[i], &self.nodes[j]);
-            match (a.count > 0, b.count > 0) {
-                _ if !a.bounds.overlaps(&b.bounds) => {}
-                (true, _) if i == j => self.pairs_within(a, &mut visit),
-                (false, _) if i == j => {
-                    let (left, right) = (i + 1, a.link as usize);
-                    stack.extend([(left, left), (right, right), (left, right)]);
-                }
-                (true, true) => self.pairs_between(a, b, &mut visit),
-                (false, true) => stack.extend([(i + 1, j), (a.link as usize, j)]),
-                // The pair is swapped, so that both nodes are split in turn.
-                (_, false) => stack.extend([(j + 1, i), (b.link as usize, i)]),
-            }
-        }
+        let mut pairs = self.pairs();
+        while goes_on.get() && pairs.advance(&mut visit) {}
+    }
+
+    /// Begins a search for the pairs of items whose boxes overlap, as [`Self::for_each_pair`] makes it.
+    pub fn pairs(&self) -> OverlappingPairs<'_> {
+        OverlappingPairs { tree: self, stack: if self.nodes.is_empty() { Vec::new() } else { vec![(0, 0)] } }
     }
 
     /// Calls `visit` with items (indices of boxes) whose boxes are near `p`, roughly from near to far. `visit` also
@@ -373,6 +361,36 @@ impl BoxTree {
                 }
             }
         }
+    }
+}
+
+/// A search for the pairs of items of a [`BoxTree`] whose boxes overlap, from one pair of nodes to the next.
+#[derive(Debug)]
+pub struct OverlappingPairs<'a> {
+    tree: &'a BoxTree,
+    /// Pairs of nodes below which pairs are yet to be searched for.
+    stack: Vec<(usize, usize)>,
+}
+
+impl OverlappingPairs<'_> {
+    /// Does the next part, and calls `visit` with the pairs that it finds; returns whether there was any left to do.
+    #[inline]
+    pub fn advance(&mut self, visit: &mut impl FnMut(u32, u32)) -> bool {
+        let Some((i, j)) = self.stack.pop() else { return false };
+        let (a, b) = (&self.tree.nodes[i], &self.tree.nodes[j]);
+        match (a.count > 0, b.count > 0) {
+            _ if !a.bounds.overlaps(&b.bounds) => {}
+            (true, _) if i == j => self.tree.pairs_within(a, visit),
+            (false, _) if i == j => {
+                let (left, right) = (i + 1, a.link as usize);
+                self.stack.extend([(left, left), (right, right), (left, right)]);
+            }
+            (true, true) => self.tree.pairs_between(a, b, visit),
+            (false, true) => self.stack.extend([(i + 1, j), (a.link as usize, j)]),
+            // The pair is swapped, so that both nodes are split in turn.
+            (_, false) => self.stack.extend([(j + 1, i), (b.link as usize, i)]),
+        }
+        true
     }
 }
 

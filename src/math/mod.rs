@@ -19,7 +19,7 @@ pub mod symmetric;
 pub mod triangle;
 pub mod vectors;
 
-pub use bounds::{Bounds, BoxTree, BoxTreeBuilder, Ray, box_corners};
+pub use bounds::{Bounds, BoxTree, BoxTreeBuilder, OverlappingPairs, Ray, box_corners};
 pub use conjugate_gradients::ConjugateGradients;
 pub use directions::spread_directions;
 pub use glam::{DAffine3, DMat3, DVec2, DVec3, IVec3, Mat3, Vec2, Vec3, Vec3Swizzles, Vec4};

@@ -57,7 +57,7 @@ pub use journal::TriangleCorners;
 pub use measure::{Measures, measure};
 pub use origin::{WorldPositions, grid_origin, world_origin};
 pub use patch::{Patch, PatchCorner};
-pub use report::{MeshReport, report};
+pub use report::{MeshReport, report, report_in_slices};
 pub use ring::Ring;
 pub(crate) use self_intersections::intersecting_parts;
 pub use self_intersections::{Facet, count_self_intersections, facets_intersect, intersecting_pairs};

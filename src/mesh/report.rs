@@ -6,6 +6,7 @@ use super::self_intersections::count_in_time;
 use super::{MeshError, TriangleMesh};
 use crate::math::order::{combined_rank, sort_by_rank, sort_pairs};
 use crate::math::predicates::collinear;
+use crate::pauses::{Pauses, finished};
 
 /// The result of validating a mesh by [`report`]; see [`Self::is_healthy`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,15 +51,27 @@ impl MeshReport {
 /// [`MeshError::InvalidArgument`] if [`TriangleMesh::validate`] fails, for example for an invalid index or a position
 /// that is not finite.
 pub fn report(mesh: &TriangleMesh) -> Result<MeshReport, MeshError> {
+    finished(report_in_slices(mesh, &Pauses::default()))
+}
+
+/// Does what [`report`] does, and pauses meanwhile.
+///
+/// # Errors
+/// As [`report`].
+pub async fn report_in_slices(mesh: &TriangleMesh, pauses: &Pauses) -> Result<MeshReport, MeshError> {
     mesh.validate()?;
     let uses = sorted_half_edges(&mesh.triangles);
-    let intersections = count_in_time(mesh);
+    pauses.now().await;
+    let non_manifold_vertices = non_manifold_vertices(mesh);
+    pauses.now().await;
+    let degenerate_triangles = degenerate_triangles(mesh);
+    let intersections = count_in_time(mesh, pauses).await;
     Ok(MeshReport {
         closed: is_closed(&uses),
         oriented: is_oriented(&uses),
         non_manifold_edges: non_manifold_edges(&uses),
-        non_manifold_vertices: non_manifold_vertices(mesh),
-        degenerate_triangles: degenerate_triangles(mesh),
+        non_manifold_vertices,
+        degenerate_triangles,
         self_intersections: intersections.found,
         has_more: !intersections.is_complete,
     })
@@ -340,7 +353,8 @@ mod tests {
         for (most, is_complete) in
             [([pairs - 1, 0], false), ([pairs, 0], true), ([0, 49], false), ([0, 50], true)]
         {
-            assert_eq!(count_within(&mesh, most), CountInTime { found: 0, is_complete }, "{most:?}");
+            let counted = finished(count_within(&mesh, most, &Pauses::default()));
+            assert_eq!(counted, CountInTime { found: 0, is_complete }, "{most:?}");
         }
     }
 }

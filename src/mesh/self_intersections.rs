@@ -5,7 +5,9 @@ use crate::math::order::{combined_rank, sort_by_rank, sort_ranks};
 use crate::math::predicates::{
     collinear, triangles_intersect, triangles_intersect_sharing_vertex, triangles_overlap_sharing_edge,
 };
-use crate::math::{Bounds, BoxTree, Vec3};
+use crate::math::{Bounds, BoxTreeBuilder, Vec3};
+use crate::pauses::{Pauses, finished};
+use std::cell::Cell;
 use std::collections::BTreeSet;
 
 /// Returns the pairs of triangles that intersect beyond their common corners and edges, each with the lower index
@@ -42,17 +44,22 @@ pub fn count_self_intersections(mesh: &TriangleMesh) -> usize {
 
 /// Returns which parts of a mesh intersect each other, or themselves: pairs of the numbers in `part_of`, which has that of
 /// each triangle, the lower one first. `None` if too many triangles overlap to test all pairs.
-pub(crate) fn intersecting_parts(mesh: &TriangleMesh, part_of: &[u32]) -> Option<BTreeSet<[u32; 2]>> {
+pub(crate) async fn intersecting_parts(
+    mesh: &TriangleMesh,
+    part_of: &[u32],
+    pauses: &Pauses,
+) -> Option<BTreeSet<[u32; 2]>> {
     let most = MOST_TESTED[0].max(MOST_TESTED[1].saturating_mul(mesh.triangles.len()));
     let (mut pairs, mut tested) = (BTreeSet::new(), 0);
-    for_each_tested_pair(mesh, |s, t, intersect| {
+    let visit = |s, t, intersect| {
         tested += 1;
         if intersect {
-            let [one, other] = [s, t].map(|triangle| part_of[triangle as usize]);
+            let [one, other] = [s, t].map(|triangle: u32| part_of[triangle as usize]);
             pairs.insert([one.min(other), one.max(other)]);
         }
         tested < most
-    });
+    };
+    visit_tested_pairs(mesh, visit, pauses).await;
     (tested < most).then_some(pairs)
 }
 
@@ -74,19 +81,20 @@ pub(super) struct CountInTime {
 
 /// Counts self-intersections as [`count_self_intersections`] does, but stops where so many triangles lie on each other that
 /// time would be quadratic. Triangles with the same corners are tested once.
-pub(super) fn count_in_time(mesh: &TriangleMesh) -> CountInTime {
-    count_within(mesh, MOST_TESTED)
+pub(super) async fn count_in_time(mesh: &TriangleMesh, pauses: &Pauses) -> CountInTime {
+    count_within(mesh, MOST_TESTED, pauses).await
 }
 
 /// Does what [`count_in_time`] does, with at most as many tests as given, in all and for each triangle, whichever are more.
-pub(super) fn count_within(mesh: &TriangleMesh, most: [usize; 2]) -> CountInTime {
+pub(super) async fn count_within(mesh: &TriangleMesh, most: [usize; 2], pauses: &Pauses) -> CountInTime {
     let (distinct, times) = distinct_triangles(mesh);
+    pauses.now().await;
     let most = most[0].max(most[1].saturating_mul(times.len()));
     let corners = |t: usize| distinct.triangles[t].map(|v| distinct.positions[v as usize]);
     let pairs = times.iter().enumerate().filter(|&(t, &times)| times > 1 && !collinear(corners(t)));
     let mut found = pairs.fold(0, |sum: usize, (_, &times)| sum.saturating_add(times * (times - 1) / 2));
     let (mut tested, mut is_complete) = (0, true);
-    for_each_tested_pair(&distinct, |s, t, intersect| {
+    let visit = |s: u32, t: u32, intersect| {
         // Asked when there is another pair: the last one ends a complete search.
         is_complete = tested < most && found < MOST_FOUND;
         tested += 1;
@@ -94,7 +102,8 @@ pub(super) fn count_within(mesh: &TriangleMesh, most: [usize; 2]) -> CountInTime
             found = found.saturating_add(times[s as usize].saturating_mul(times[t as usize]));
         }
         is_complete
-    });
+    };
+    visit_tested_pairs(&distinct, visit, pauses).await;
     CountInTime { found: found.min(MOST_FOUND), is_complete: is_complete && found <= MOST_FOUND }
 }
 
@@ -124,17 +133,42 @@ fn distinct_triangles(mesh: &TriangleMesh) -> (TriangleMesh, Vec<usize>) {
 }
 
 /// Calls `visit` with each pair of triangles whose boxes overlap, and whether they intersect, until it returns false.
-fn for_each_tested_pair(mesh: &TriangleMesh, mut visit: impl FnMut(u32, u32, bool) -> bool) {
+fn for_each_tested_pair(mesh: &TriangleMesh, visit: impl FnMut(u32, u32, bool) -> bool) {
+    finished(visit_tested_pairs(mesh, visit, &Pauses::default()));
+}
+
+/// Pairs of nodes or triangles whose tests are a unit of work.
+const PER_UNIT: usize = 32;
+
+/// Does what [`for_each_tested_pair`] does, and pauses meanwhile.
+async fn visit_tested_pairs(
+    mesh: &TriangleMesh,
+    mut visit: impl FnMut(u32, u32, bool) -> bool,
+    pauses: &Pauses,
+) {
     let (valid, boxes): (Vec<u32>, Vec<Bounds>) = (0..)
         .zip(&mesh.triangles)
         .filter_map(|(t, triangle)| {
             valid_corners(mesh, triangle).map(|corners| (t, Bounds::from_points(&corners)))
         })
         .unzip();
-    BoxTree::new(&boxes).for_each_pair(|i, j| {
-        let (s, t) = (valid[i as usize], valid[j as usize]);
-        visit(s, t, facets_intersect(&facet(mesh, s), &facet(mesh, t)))
-    });
+    let mut builder = BoxTreeBuilder::new(&boxes);
+    while let Some(boxes) = builder.advance() {
+        pauses.after(boxes / PER_UNIT).await;
+    }
+    let tree = builder.finish();
+    let (tested, goes_on) = (Cell::new(0), Cell::new(true));
+    let mut test = |i: u32, j: u32| {
+        if goes_on.get() {
+            tested.set(tested.get() + 1);
+            let (s, t) = (valid[i as usize], valid[j as usize]);
+            goes_on.set(visit(s, t, facets_intersect(&facet(mesh, s), &facet(mesh, t))));
+        }
+    };
+    let mut pairs = tree.pairs();
+    while goes_on.get() && (0..PER_UNIT).all(|_| pairs.advance(&mut test)) {
+        pauses.after(1 + tested.take() / PER_UNIT).await;
+    }
 }
 
 fn valid_corners(mesh: &TriangleMesh, &[a, b, c]: &[u32; 3]) -> Option<[Vec3; 3]> {

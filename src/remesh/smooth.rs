@@ -68,6 +68,9 @@ const AGAIN: usize = 3;
 /// Vertices moved per unit of work.
 const PER_UNIT: usize = 50;
 
+/// Vertices moved between two counts of the work.
+const CHUNK: usize = 64 * PER_UNIT;
+
 /// The length by which the ordinary edge of collision handling exceeds the mean edge, as a factor.
 const ORDINARY_EDGE: f64 = 1.5;
 
@@ -109,7 +112,7 @@ pub async fn smooth_in_slices(
     let [shrink, grow] = unit_scale(edge.min(f64::from(f32::MAX)) as f32);
     mesh.positions_mut().iter_mut().for_each(|p| *p *= shrink);
     let before = mesh.positions().to_vec();
-    let mut smoother = Smoother::new(mesh, keeps_volume);
+    let mut smoother = Smoother::new(mesh, keeps_volume, pauses).await;
     smoother.run(mesh, iterations, pauses).await;
     let ordinary_edge = (edge * f64::from(shrink) * ORDINARY_EDGE) as f32;
     let smoothed = mesh.positions().to_vec();
@@ -186,14 +189,17 @@ impl Component {
 
 impl Smoother {
     /// Prepares to smooth `mesh` without a guard.
-    fn new(mesh: &Mesh, keeps_volume: bool) -> Self {
-        let components = if keeps_volume { mesh.component_members() } else { Vec::new() };
-        Self {
-            guard: None,
-            balance: keeps_volume.then(|| VolumeBalance::new(mesh)),
-            components: components.into_iter().map(|vertices| Component::new(mesh, vertices)).collect(),
-            displacements: vec![Vec3::ZERO; mesh.slots()],
+    async fn new(mesh: &Mesh, keeps_volume: bool, pauses: &Pauses) -> Self {
+        let displacements = vec![Vec3::ZERO; mesh.slots()];
+        if !keeps_volume {
+            return Self { guard: None, balance: None, components: Vec::new(), displacements };
         }
+        let balance = Some(VolumeBalance::new(mesh, pauses).await);
+        let members = mesh.component_members();
+        pauses.after(mesh.slots() / PER_UNIT).await;
+        let components = members.into_iter().map(|vertices| Component::new(mesh, vertices)).collect();
+        pauses.after(mesh.slots() / PER_UNIT).await;
+        Self { guard: None, balance, components, displacements }
     }
 
     async fn run(&mut self, mesh: &mut Mesh, iterations: usize, pauses: &Pauses) {
@@ -201,15 +207,12 @@ impl Smoother {
         for i in 1..=iterations {
             self.step(mesh, &all, SHRINK, pauses).await;
             self.step(mesh, &all, -GROW, pauses).await;
-            pauses.after(all.len() / PER_UNIT).await;
             if i % BETWEEN == 0 {
                 self.balance(mesh, &all, pauses).await;
-                pauses.after(all.len() / PER_UNIT).await;
             }
         }
         for _ in 0..BALANCES {
             self.balance(mesh, &all, pauses).await;
-            pauses.after(all.len() / PER_UNIT).await;
         }
         self.correct_volumes(mesh, pauses).await;
     }
@@ -234,7 +237,6 @@ impl Smoother {
         for _ in 0..iterations.min(AGAIN) {
             self.step(mesh, &around, SHRINK, pauses).await;
             self.step(mesh, &around, -GROW, pauses).await;
-            pauses.after(around.len()).await;
         }
         self.correct_volumes(mesh, pauses).await;
         true
@@ -243,7 +245,7 @@ impl Smoother {
     /// Gives volume back where it was lost, if it is to be kept.
     async fn balance(&mut self, mesh: &mut Mesh, all: &[VertexId], pauses: &Pauses) {
         let Some(balance) = &mut self.balance else { return };
-        balance.displacements(mesh.positions(), MAX_OFFSET as f32, &mut self.displacements);
+        balance.displacements(mesh.positions(), MAX_OFFSET as f32, &mut self.displacements, pauses).await;
         self.apply(mesh, all, pauses).await;
     }
 
@@ -259,9 +261,12 @@ impl Smoother {
 
     /// Moves vertices, sorted by id, by `factor` of the way to the mean of their neighbours.
     async fn step(&mut self, mesh: &mut Mesh, moving: &[VertexId], factor: f32, pauses: &Pauses) {
-        for &v in moving {
-            let to_mean = mesh.ring(v).mean(mesh.positions()) - mesh.position(v);
-            self.displacements[v.index()] = to_mean * factor;
+        for chunk in moving.chunks(CHUNK) {
+            for &v in chunk {
+                let to_mean = mesh.ring(v).mean(mesh.positions()) - mesh.position(v);
+                self.displacements[v.index()] = to_mean * factor;
+            }
+            pauses.after(chunk.len() / PER_UNIT).await;
         }
         self.apply(mesh, moving, pauses).await;
     }
@@ -410,7 +415,7 @@ mod tests {
     /// many.
     fn unguarded(mesh: &Mesh, smoothing: Smoothing) -> (Mesh, Option<Vec<VertexId>>) {
         let mut smoothed = mesh.clone();
-        let mut smoother = Smoother::new(mesh, smoothing.keeps_volume);
+        let mut smoother = finished(Smoother::new(mesh, smoothing.keeps_volume, &Pauses::default()));
         finished(smoother.run(&mut smoothed, smoothing.iterations, &Pauses::default()));
         let mut guard = embedding_of(mesh, mean_edge(mesh) as f32 * 1.5);
         let most = MOST_HELD.max(mesh.vertex_count() / VERTICES_PER_HELD);

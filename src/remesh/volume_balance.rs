@@ -9,11 +9,15 @@
 
 use crate::math::{Vec3, Vec4};
 use crate::mesh::Mesh;
+use crate::pauses::Pauses;
 
 /// The number of times that changes are averaged over neighbours; the width of the average is about its root, in edges.
 /// With 8, noise of six edges remains that smoothing alone removes; with 48, a rod of one voxel's thickness grows by 3 %
 /// instead of 1 %.
 const AVERAGES: usize = 24;
+
+/// Vertices whose changes are averaged, per unit of work.
+const PER_UNIT: usize = 200;
 
 /// The volume that a mesh of constant connectivity has gained since the beginning, and where.
 pub(super) struct VolumeBalance {
@@ -35,7 +39,7 @@ pub(super) struct VolumeBalance {
 
 impl VolumeBalance {
     /// Begins at the present positions of `mesh`.
-    pub fn new(mesh: &Mesh) -> Self {
+    pub async fn new(mesh: &Mesh, pauses: &Pauses) -> Self {
         let (first, links) = links(mesh);
         let mut balance = Self {
             start: mesh.positions().to_vec(),
@@ -46,18 +50,26 @@ impl VolumeBalance {
             normals: vec![Vec3::ZERO; mesh.slots()],
             changes: [(); 2].map(|()| vec![Vec4::ZERO; mesh.slots()]),
         };
+        pauses.after(mesh.slots() / PER_UNIT).await;
         balance.set_normals(mesh.positions());
         balance.changes[0] = balance.normals.iter().map(|&normal| Vec4::splat(size(normal))).collect();
-        balance.average();
+        balance.average(pauses).await;
         balance.sizes = balance.changes[0].iter().map(|size| size.w).collect();
         balance
     }
 
     /// Sets `displacements` to those that give volume back where it was lost, by offsets of at most `most`.
-    pub fn displacements(&mut self, positions: &[Vec3], most: f32, displacements: &mut [Vec3]) {
+    pub async fn displacements(
+        &mut self,
+        positions: &[Vec3],
+        most: f32,
+        displacements: &mut [Vec3],
+        pauses: &Pauses,
+    ) {
         self.set_normals(positions);
+        pauses.after(positions.len() / PER_UNIT).await;
         self.measure(positions);
-        self.average();
+        self.average(pauses).await;
         for (i, displacement) in displacements.iter_mut().enumerate() {
             let change = self.changes[0][i];
             // Where neighbours are much smaller, their average would give too large an offset, and then oscillate.
@@ -97,7 +109,7 @@ impl VolumeBalance {
     }
 
     /// Averages the changes over neighbours. What one vertex gives, another one gets, so that sums are kept.
-    fn average(&mut self) {
+    async fn average(&mut self, pauses: &Pauses) {
         let [from, to] = &mut self.changes;
         for _ in 0..AVERAGES {
             for ((to, own), ends) in to.iter_mut().zip(from.iter()).zip(self.first.windows(2)) {
@@ -105,6 +117,7 @@ impl VolumeBalance {
                 *to = links.iter().fold(*own, |sum, &(v, share)| sum + (from[v as usize] - *own) * share);
             }
             std::mem::swap(from, to);
+            pauses.after(from.len() / PER_UNIT).await;
         }
     }
 }
@@ -142,6 +155,7 @@ mod tests {
     use super::*;
     use crate::mesh::measure;
     use crate::mesh::shapes::torus;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -150,12 +164,13 @@ mod tests {
         let before = torus(3.0, 1.0, 30, 12);
         let mut after = before.clone();
         after.positions.iter_mut().for_each(|p| *p += Vec3::new(0.2 * p.y, 0.1 * p.x * p.z, 0.3 * p.z));
-        let mut balance = VolumeBalance::new(&Mesh::from_triangles(&before).unwrap());
+        let mesh = Mesh::from_triangles(&before).unwrap();
+        let mut balance = finished(VolumeBalance::new(&mesh, &Pauses::default()));
         balance.measure(&after.positions);
         let swept = |balance: &VolumeBalance| balance.changes[0].iter().map(|c| f64::from(c.w)).sum::<f64>();
         let expected = measure(&after).volume - measure(&before).volume;
         assert!((swept(&balance) / expected - 1.0).abs() < 1e-4, "{} {expected}", swept(&balance));
-        balance.average();
+        finished(balance.average(&Pauses::default()));
         assert!((swept(&balance) / expected - 1.0).abs() < 1e-4, "{} {expected}", swept(&balance));
     }
 }

@@ -1,8 +1,12 @@
 //! Triangles in a hierarchy of flat cylinders.
 
 use super::four_triangles::FourTriangles;
-use crate::math::{Bounds, BoxTree, DVec3, Vec3, triangle};
+use crate::math::{Bounds, BoxTree, BoxTreeBuilder, DVec3, Vec3, triangle};
+use crate::pauses::Pauses;
 use std::ops::Range;
+
+/// Triangles that are sorted, or enclosed in a cylinder, in a unit of work.
+const TRIANGLES_PER_UNIT: usize = 64;
 
 /// A bounding volume hierarchy of triangles whose nodes are flat cylinders, along the mean normal of their triangles.
 ///
@@ -21,9 +25,14 @@ pub(super) struct CylinderTree {
 }
 
 impl CylinderTree {
-    pub(super) fn new(triangles: &[[Vec3; 3]]) -> Self {
+    /// Builds the tree, and pauses meanwhile.
+    pub(super) async fn new(triangles: &[[Vec3; 3]], pauses: &Pauses) -> Self {
         let bounds: Vec<_> = triangles.iter().map(|c| Bounds::from_points(c)).collect();
-        let boxes = BoxTree::new(&bounds);
+        let mut builder = BoxTreeBuilder::new(&bounds);
+        while let Some(triangles) = builder.advance() {
+            pauses.after(triangles / TRIANGLES_PER_UNIT).await;
+        }
+        let boxes = builder.finish();
         let corners: Vec<_> = boxes.order().map(|t| triangles[t as usize]).collect();
         let (mut cylinders, mut leaves_before, mut leaves) = (Vec::new(), Vec::new(), Vec::new());
         for node in 0..boxes.node_count() {
@@ -33,6 +42,7 @@ impl CylinderTree {
             if boxes.children(node).is_none() {
                 leaves.push(FourTriangles::new(own));
             }
+            pauses.after(own.len() / TRIANGLES_PER_UNIT).await;
         }
         Self { boxes, cylinders, corners, leaves_before, leaves }
     }
@@ -129,6 +139,7 @@ mod tests {
     use super::*;
     use crate::math::Random;
     use crate::mesh::shapes::{soup, torus};
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -139,7 +150,7 @@ mod tests {
         let mut random = Random::new(2);
         for mesh in [torus(3.0, 1.0, 14, 8), soup(4, 60, 5)] {
             let triangles: Vec<_> = mesh.corners().collect();
-            let tree = CylinderTree::new(&triangles);
+            let tree = finished(CylinderTree::new(&triangles, &Pauses::default()));
             assert_eq!(tree.triangles_of(0).len(), triangles.len());
             for node in 0..tree.cylinders.len() {
                 let p = DVec3::from([(); 3].map(|()| 10.0 * random.unit() - 5.0));
@@ -166,7 +177,8 @@ mod tests {
     #[test]
     fn the_middle_of_a_ball_is_far_from_all_cylinders() {
         let ball = crate::mesh::Mesh::icosphere(Vec3::ZERO, 1.0, 0.04).unwrap().to_triangles();
-        let tree = CylinderTree::new(&ball.corners().collect::<Vec<_>>());
+        let corners: Vec<_> = ball.corners().collect();
+        let tree = finished(CylinderTree::new(&corners, &Pauses::default()));
         let small = (0..tree.cylinders.len()).filter(|node| tree.triangles_of(*node).len() <= 32);
         for distance in small.map(|node| tree.cylinder(node).offset(DVec3::ZERO).length()) {
             assert!(distance > 0.97, "{distance}");

@@ -16,6 +16,7 @@ use super::four_triangles::{
 };
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
+use crate::pauses::Pauses;
 use smallvec::SmallVec;
 use std::ops::Range;
 use wide::f32x4;
@@ -24,15 +25,16 @@ use wide::f32x4;
 /// the mesh, x fastest: `map` leads from lattice indices to the space of the mesh, `dims` are the numbers of points,
 /// whose product is the length of `out`.
 ///
-/// Exact but for rounding: to a millionth of the distance or of the size of the triangles there.
+/// Exact but for rounding: to a millionth of the distance or of the size of the triangles there. Pauses meanwhile.
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] (parameter `mesh`) if the mesh has no triangle; as [`TriangleMesh::validate`].
-pub fn lattice_distances(
+pub async fn lattice_distances(
     mesh: &TriangleMesh,
     map: &DAffine3,
     dims: [usize; 3],
     out: &mut [f32],
+    pauses: &Pauses,
 ) -> Result<(), MeshError> {
     if mesh.triangles.is_empty() {
         let problem = "must have triangles for distances, got none".to_owned();
@@ -43,11 +45,21 @@ pub fn lattice_distances(
     let [shrink, grow] = scale(mesh, &lattice, map);
     let triangles: Vec<_> =
         mesh.corners().map(|corners| corners.map(|p| (p.as_dvec3() * shrink).as_vec3())).collect();
-    let tree = CylinderTree::new(&triangles);
+    let tree = CylinderTree::new(&triangles, pauses).await;
     let map = DAffine3 { matrix3: map.matrix3 * shrink, translation: map.translation * shrink };
     let candidates = vec![Candidate { node: 0, distance: 0.0, direction: DVec3::ZERO }];
     let mut search = Search { tree: &tree, map, dims, grow, out, candidates };
-    search.search(lattice, DVec3::ZERO, 0..1, 0);
+    let mut tasks = vec![Task::Search { block: lattice, outer: DVec3::ZERO, candidates: 0..1, near: 0 }];
+    while let Some(task) = tasks.pop() {
+        match task {
+            Task::Search { block, outer, candidates, near } => {
+                let work = candidates.len();
+                search.search(block, outer, candidates, near, &mut tasks);
+                pauses.after(1 + work / CANDIDATES_PER_UNIT).await;
+            }
+            Task::Forget(begin) => search.candidates.truncate(begin),
+        }
+    }
     Ok(())
 }
 
@@ -175,6 +187,18 @@ const ALONG: f64 = 0.05;
 /// Distance below which its direction is not reliable, relative to the size of a block.
 const TOUCHING: f64 = 1e-6;
 
+/// Candidates of a block that are a unit of work.
+const CANDIDATES_PER_UNIT: usize = 16;
+
+/// What is to be done, on a stack.
+enum Task {
+    /// Compute the distances of all points of a block: `candidates` are those of the block that it is half of, whose centre
+    /// is `outer`, and `near` is the closest triangle to it.
+    Search { block: Block, outer: DVec3, candidates: Range<usize>, near: usize },
+    /// Remove the candidates of a block, from this one on.
+    Forget(usize),
+}
+
 struct Search<'a> {
     tree: &'a CylinderTree,
     map: DAffine3,
@@ -187,9 +211,15 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Computes the distances of all points of a block: `candidates` are those of the block that it is half of, whose
-    /// centre is `outer`, and `near` is the closest triangle to it.
-    fn search(&mut self, block: Block, outer: DVec3, candidates: Range<usize>, near: usize) {
+    /// Computes the distances of all points of a block, given as in [`Task::Search`], or has that done by `tasks`.
+    fn search(
+        &mut self,
+        block: Block,
+        outer: DVec3,
+        candidates: Range<usize>,
+        near: usize,
+        tasks: &mut Vec<Task>,
+    ) {
         let half = block.half();
         let centre = self.map.transform_point3(DVec3::from(block.start.map(|i| i as f64)) + half);
         let matrix = self.map.matrix3;
@@ -200,13 +230,17 @@ impl Search<'_> {
         self.select(&block, centre, centre - outer, candidates, &bound);
         if block.count() <= SMALLEST {
             Points::new(&block, self, centre, &bound).search(self, begin, &bound);
+            self.candidates.truncate(begin);
         } else {
-            let own = begin..self.candidates.len();
-            for part in block.halved(longest_axis(&block, &bound)) {
-                self.search(part, centre, own.clone(), near);
-            }
+            tasks.push(Task::Forget(begin));
+            let [low, high] = block.halved(longest_axis(&block, &bound));
+            tasks.extend([high, low].map(|block| Task::Search {
+                block,
+                outer: centre,
+                candidates: begin..self.candidates.len(),
+                near,
+            }));
         }
-        self.candidates.truncate(begin);
     }
 
     /// Returns a triangle near `centre`, `near` or one of the nearest candidate, and the vector to `centre` from its
@@ -463,13 +497,14 @@ mod tests {
     use crate::math::{DMat3, Random, triangle};
     use crate::mesh::Mesh;
     use crate::mesh::shapes::{cuboid, joined, soup, torus};
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     /// Compares the distances of a lattice with those of all triangles, at each `step`-th point.
     fn check(mesh: &TriangleMesh, map: &DAffine3, dims: [usize; 3], step: usize, accuracy: f64) {
         let mut found = vec![f32::NAN; dims.iter().product()];
-        lattice_distances(mesh, map, dims, &mut found).unwrap();
+        finished(lattice_distances(mesh, map, dims, &mut found, &Pauses::default())).unwrap();
         assert!(found.iter().all(|distance| *distance >= 0.0));
         for (i, found) in found.into_iter().enumerate().step_by(step) {
             let index = [i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1])];
@@ -573,7 +608,8 @@ mod tests {
 
     #[test]
     fn a_mesh_without_triangles_is_refused() {
-        let found = lattice_distances(&TriangleMesh::default(), &DAffine3::IDENTITY, [1; 3], &mut [0.0]);
+        let (none, pauses) = (TriangleMesh::default(), Pauses::default());
+        let found = finished(lattice_distances(&none, &DAffine3::IDENTITY, [1; 3], &mut [0.0], &pauses));
         assert!(matches!(found, Err(MeshError::InvalidArgument { parameter: "mesh", .. })));
     }
 }

@@ -4,6 +4,7 @@
 use super::{SurfacePoint, TriangleTree};
 use crate::math::{DVec3, Groups, Vec3, triangle};
 use crate::mesh::{MeshError, TriangleMesh};
+use crate::pauses::Pauses;
 use std::cell::OnceCell;
 
 /// A static closed surface onto which many points are projected, each by a walk from the triangle of a nearby
@@ -30,6 +31,13 @@ impl SurfaceWalker {
         mesh.validate()?;
         let across = neighbours(&mesh)?;
         Ok(Self { mesh, across, tree: OnceCell::new() })
+    }
+
+    /// Builds the tree of [`Self::tree`], and pauses meanwhile.
+    pub async fn build_tree(&self, pauses: &Pauses) {
+        if let Ok(tree) = TriangleTree::in_slices(&self.mesh, pauses).await {
+            self.tree.get_or_init(|| tree);
+        }
     }
 
     /// Returns the mesh that is walked over, as passed to [`Self::new`].

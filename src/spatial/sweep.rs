@@ -45,6 +45,9 @@ const TESTS_PER_UNIT: usize = 256;
 /// The number of tests after which a sweep counts its work: columns have few.
 const TESTS: usize = 16 * TESTS_PER_UNIT;
 
+/// The number of balls of a column that are compared between two counts; columns of most meshes have fewer.
+const CHUNK: usize = 32;
+
 /// Calls `found` once with every pair of `balls` whose centres are no farther apart than [`Proximity::distance_for`]
 /// returns for their radii, and pauses meanwhile. The order is unspecified but deterministic.
 pub async fn near_pairs(
@@ -99,9 +102,9 @@ async fn sweep_class(
     let largest = class.iter().fold(0.0, |most, ball| if ball.radius > most { ball.radius } else { most });
     let reach = near.distance_for(largest, largest);
     let width = Width(1.0 / (COLUMN_MARGIN * f64::from(reach)));
-    let tests = Cell::new(0);
+    let tests = Tests { count: Cell::new(0), pauses };
     let mut test = |a: &VertexBall, b: &VertexBall| {
-        tests.set(tests.get() + 1);
+        tests.count.set(tests.count.get() + 1);
         let reach = near.distance_for(a.radius, b.radius);
         if a.position.distance_squared(b.position) <= reach * reach {
             found(a, b);
@@ -111,8 +114,7 @@ async fn sweep_class(
     pauses.now().await;
     let mut row = 0;
     for k in 0..large.count() {
-        large.pairs_at(k, &mut row, reach, &mut test);
-        count(&tests, pauses).await;
+        large.pairs_at(k, &mut row, reach, &mut test, &tests).await;
     }
     if !smaller.is_empty() {
         let filter = Filter::around(&large);
@@ -120,17 +122,24 @@ async fn sweep_class(
         let around = Columns::new(width, around.collect());
         let mut rows = [0; 3];
         for k in 0..large.count() {
-            large.pairs_at_with(k, &around, &mut rows, reach, &mut test);
-            count(&tests, pauses).await;
+            large.pairs_at_with(k, &around, &mut rows, reach, &mut test, &tests).await;
         }
     }
     large.balls
 }
 
-/// Counts tests as work once there are many.
-async fn count(tests: &Cell<usize>, pauses: &Pauses) {
-    if tests.get() >= TESTS {
-        pauses.after(tests.replace(0) / TESTS_PER_UNIT).await;
+/// The tests of a sweep that are not yet counted as work.
+struct Tests<'a> {
+    count: Cell<usize>,
+    pauses: &'a Pauses,
+}
+
+impl Tests<'_> {
+    /// Counts the tests as work once there are many.
+    async fn counted(&self) {
+        if self.count.get() >= TESTS {
+            self.pauses.after(self.count.replace(0) / TESTS_PER_UNIT).await;
+        }
     }
 }
 
@@ -256,58 +265,65 @@ impl Columns {
 
     /// Calls `test` with the pairs of a ball in column `k` and one in it or in an adjacent column after it, whose heights
     /// differ by at most `reach`. To be called for all columns in order, with the same `row`, which is 0 at first.
-    fn pairs_at(
+    async fn pairs_at(
         &self,
         k: usize,
         row: &mut usize,
         reach: f32,
         test: &mut impl FnMut(&VertexBall, &VertexBall),
+        tests: &Tests<'_>,
     ) {
         let [x, y] = self.column(k);
         let own = self.balls(k);
-        for (i, a) in own.iter().enumerate() {
-            let top = a.position.z + reach;
-            own[i + 1..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
+        for start in (0..own.len()).step_by(CHUNK) {
+            let end = own.len().min(start + CHUNK);
+            for (i, a) in (start + 1..).zip(&own[start..end]) {
+                let top = a.position.z + reach;
+                own[i..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
+            }
+            tests.counted().await;
         }
         if self.column(k + 1) == [x, y + 1] {
-            visit_column_pairs(own, self.balls(k + 1), reach, test);
+            visit_column_pairs(own, self.balls(k + 1), reach, test, tests).await;
         }
-        self.visit_row_pairs(own, [x + 1, y], row, reach, test);
+        self.visit_row_pairs(own, [x + 1, y], row, reach, test, tests).await;
     }
 
     /// Calls `test` with the pairs of a ball in column `k` and one of `other` in the same or an adjacent column, whose
     /// heights differ by at most `reach`. To be called for all columns in order, with the same `rows`, which are 0 at first.
-    fn pairs_at_with(
+    async fn pairs_at_with(
         &self,
         k: usize,
         other: &Self,
         rows: &mut [usize; 3],
         reach: f32,
         test: &mut impl FnMut(&VertexBall, &VertexBall),
+        tests: &Tests<'_>,
     ) {
         let [x, y] = self.column(k);
         for (row, x) in rows.iter_mut().zip(x - 1..=x + 1) {
-            other.visit_row_pairs(self.balls(k), [x, y], row, reach, test);
+            other.visit_row_pairs(self.balls(k), [x, y], row, reach, test, tests).await;
         }
     }
 
     /// Calls `test` with the pairs of `balls` and the balls of the columns `[x, y − 1]` to `[x, y + 1]` whose heights
     /// differ by at most `reach`. `row` is an index at or before the first of these columns and is advanced to it, so
     /// successive calls must be in the order of columns.
-    fn visit_row_pairs(
+    async fn visit_row_pairs(
         &self,
         balls: &[VertexBall],
         [x, y]: [i32; 2],
         row: &mut usize,
         reach: f32,
         test: &mut impl FnMut(&VertexBall, &VertexBall),
+        tests: &Tests<'_>,
     ) {
         while self.column(*row) < [x, y - 1] {
             *row += 1;
         }
         let mut k = *row;
         while self.column(k) <= [x, y + 1] {
-            visit_column_pairs(balls, self.balls(k), reach, test);
+            visit_column_pairs(balls, self.balls(k), reach, test, tests).await;
             k += 1;
         }
     }
@@ -315,20 +331,36 @@ impl Columns {
 
 /// Calls `test` with the pairs of balls of two columns whose heights differ by at most `reach`; both columns are sorted
 /// by height.
-#[inline]
-fn visit_column_pairs(
+async fn visit_column_pairs(
     balls: &[VertexBall],
     others: &[VertexBall],
     reach: f32,
     test: &mut impl FnMut(&VertexBall, &VertexBall),
+    tests: &Tests<'_>,
 ) {
     let mut low = 0;
+    for chunk in balls.chunks(CHUNK) {
+        visit_chunk_pairs(chunk, others, &mut low, reach, test);
+        tests.counted().await;
+    }
+}
+
+/// Calls `test` with the pairs of balls of a chunk of a column and of another one; `low` is the index of the first of
+/// the others that may be high enough, 0 for the first chunk.
+#[inline]
+fn visit_chunk_pairs(
+    balls: &[VertexBall],
+    others: &[VertexBall],
+    low: &mut usize,
+    reach: f32,
+    test: &mut impl FnMut(&VertexBall, &VertexBall),
+) {
     for a in balls {
         let (bottom, top) = (a.position.z - reach, a.position.z + reach);
-        while low < others.len() && others[low].position.z < bottom {
-            low += 1;
+        while *low < others.len() && others[*low].position.z < bottom {
+            *low += 1;
         }
-        others[low..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
+        others[*low..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
     }
 }
 
@@ -372,9 +404,23 @@ mod tests {
     use super::*;
     use crate::math::{Random, Vec3};
     use crate::mesh::VertexId;
-    use crate::pauses::finished;
+    use crate::pauses::{advance, finished};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    /// Where all balls are in one column, as those of a mesh that intersects itself everywhere.
+    #[test]
+    fn a_column_of_many_balls_has_pauses() {
+        let ball = |k| VertexBall { vertex: VertexId(k), position: Vec3::Z * 1e-4 * k as f32, radius: 1.0 };
+        let (balls, mut pairs) = ((0..2000).map(ball).collect(), 0);
+        let near = Proximity { least: 0.0, margin: 0.0, share: 1.0 };
+        let pauses = Pauses::default();
+        let mut sweep = Box::pin(near_pairs(balls, near, |_, _| pairs += 1, &pauses));
+        let count = (0..).take_while(|_| advance(&mut sweep).is_pending()).count();
+        drop(sweep);
+        assert_eq!(pairs, 2000 * 1999 / 2);
+        assert!(count > 10, "{count}");
+    }
 
     /// Returns random balls in a box or on a plane, some outliers, some coincident, of ordinary, tiny and huge size.
     fn balls(random: &mut Random) -> Vec<VertexBall> {

@@ -4,6 +4,7 @@ use super::VolumeError;
 use super::error::filled;
 use super::row_sweep::for_each_row;
 use crate::math::DVec3;
+use crate::pauses::Pauses;
 use smallvec::SmallVec;
 
 /// Coverage below which a voxel counts as outside: rounding of sums along a row stays below it.
@@ -17,15 +18,19 @@ type Polygon = SmallVec<[DVec3; 9]>;
 ///
 /// The integral of the winding number over each voxel is computed by clipping the triangles to the voxels, exact but
 /// for rounding: coverage is exact where the surface does not intersect itself. Elsewhere the absolute value of the
-/// integral is limited to 1, so that voxels on overlapping components may be too high.
+/// integral is limited to 1, so that voxels on overlapping components may be too high. Pauses between slices.
 ///
 /// # Errors
 /// [`VolumeError::TooLarge`].
-pub fn coverage(surface: (&[DVec3], &[[u32; 3]]), dims: [usize; 3]) -> Result<Vec<f32>, VolumeError> {
+pub async fn coverage(
+    surface: (&[DVec3], &[[u32; 3]]),
+    dims: [usize; 3],
+    pauses: &Pauses,
+) -> Result<Vec<f32>, VolumeError> {
     let (positions, triangles) = surface;
     let mut fractions = filled(dims.iter().product(), 0.0)?;
     let mut row = Row::new(dims[0])?;
-    for_each_row(surface, dims, 0.5, |y, z, near| {
+    let add = |y: usize, z: usize, near: &[u32]| {
         for &t in near {
             let triangle = triangles[t as usize].map(|v| positions[v as usize]);
             let slab = between(&Polygon::from_slice(&triangle), 2, z);
@@ -33,7 +38,8 @@ pub fn coverage(surface: (&[DVec3], &[[u32; 3]]), dims: [usize; 3]) -> Result<Ve
         }
         let start = dims[0] * (y + dims[1] * z);
         row.finish(&mut fractions[start..start + dims[0]]);
-    });
+    };
+    for_each_row(surface, dims, 0.5, add, pauses).await;
     Ok(fractions)
 }
 
@@ -140,12 +146,13 @@ mod tests {
     use crate::math::{Random, Vec3};
     use crate::mesh::shapes::{cuboid, joined, torus};
     use crate::mesh::{Mesh, TriangleMesh, measure};
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     fn covered(mesh: &TriangleMesh, dims: [usize; 3]) -> Vec<f32> {
         let positions: Vec<DVec3> = mesh.positions.iter().map(|p| p.as_dvec3()).collect();
-        coverage((&positions, &mesh.triangles), dims).unwrap()
+        finished(coverage((&positions, &mesh.triangles), dims, &Pauses::default())).unwrap()
     }
 
     fn sum(fractions: &[f32]) -> f64 {

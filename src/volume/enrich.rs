@@ -5,7 +5,7 @@ use super::derived::Derivation;
 use super::error::{VolumeError, reserve};
 use super::flow::{Flow, Image, symmetric_flow};
 use super::voxels::Voxels;
-use super::{Volume, VolumeInit};
+use super::{Region, Volume, VolumeInit};
 use crate::math::{DAffine3, DVec3};
 use crate::pauses::{Pauses, finished};
 
@@ -38,7 +38,7 @@ impl Volume {
         finished(self.enrich_in_slices(factor, method, &Pauses::default()))
     }
 
-    /// As [`Self::enrich_slices`], with a pause after each image that is interpolated.
+    /// As [`Self::enrich_slices`], with pauses.
     ///
     /// # Errors
     /// Those of [`Self::enrich_slices`].
@@ -114,37 +114,47 @@ impl Volume {
         let mut longer = dims;
         longer[axis] = (dims[axis] - 1) * factor + 1;
         let out = Slices::new(longer, axis);
-        let mut values = reserve(longer[0] * longer[1] * longer[2])?;
-        values.resize(longer[0] * longer[1] * longer[2], 0.0f64);
-        let stored = |index: usize| self.voxels.get(start + index).unwrap_or(f64::NAN);
-        // The flow is computed on normalised intensities, which are finite even for NaN voxels.
-        let intensities = self.normalised_grid(frame)?.values;
-        let mut before = slices.image(0, &intensities)?;
+        let mut voxels = self.voxels.zeros_like(longer[0] * longer[1] * longer[2])?;
+        let given = |slice| slices.voxel_indices(slice).map(move |index| start + index..start + index + 1);
+        let mut put = |slice, made: &Voxels| {
+            voxels.overwrite(out.voxel_indices(slice).map(|index| index..index + 1), made);
+        };
+        let mut before = self.normalised_slice(frame, axis, 0)?;
         for slice in 0..dims[axis] {
-            let given = slices.voxel_indices(slice).map(stored);
-            out.voxel_indices(slice * factor).zip(given).for_each(|(at, value)| values[at] = value);
+            pauses.now().await;
+            put(slice * factor, &self.voxels.gathered(slices.pixels(), given(slice))?);
             if slice + 1 == dims[axis] {
                 break;
             }
-            let after = slices.image(slice + 1, &intensities)?;
+            let after = self.normalised_slice(frame, axis, slice + 1)?;
             pauses.now().await;
             let flow = match method {
-                Enrichment::Flow => Some(weighted_by_confidence(
-                    &before,
-                    &after,
-                    symmetric_flow(&before, &after, pauses).await?,
-                )?),
+                Enrichment::Flow => {
+                    let flow = symmetric_flow(&before, &after, pauses).await?;
+                    Some(weighted_by_confidence(&before, &after, flow, pauses).await?)
+                }
                 Enrichment::Linear => None,
             };
             for step in 1..factor {
                 pauses.now().await;
                 let image = in_between(&before, &after, flow.as_ref(), step as f32 / factor as f32)?;
-                let made = image.values.iter().map(|&value| self.stored(f64::from(value)));
-                out.voxel_indices(slice * factor + step).zip(made).for_each(|(at, value)| values[at] = value);
+                pauses.now().await;
+                let mut made = reserve(slices.pixels())?;
+                made.extend(image.values.iter().map(|&value| self.stored(f64::from(value))));
+                put(slice * factor + step, &self.voxels.like(&made)?);
             }
             before = after;
         }
-        self.voxels.like(&values)
+        Ok(voxels)
+    }
+
+    /// Returns a slice as an image. The flow is computed on normalised intensities, which are finite even for NaN voxels.
+    fn normalised_slice(&self, frame: usize, axis: usize, slice: usize) -> Result<Image, VolumeError> {
+        let (mut min, mut dims) = ([0; 3], self.dims());
+        (min[axis], dims[axis]) = (slice, 1);
+        let values = self.normalised_region(Region { min, dims }, frame)?.values;
+        let Slices { across: width, down: height, .. } = Slices::new(self.dims(), axis);
+        Ok(Image { width, height, values })
     }
 
     /// Converts an intensity on the scale of [`Self::normalised_grid`] (0 to 1) to a stored value.
@@ -180,20 +190,28 @@ impl Slices {
         (0..down).flat_map(move |y| (0..across).map(move |x| slice * along + y * row + x * step))
     }
 
-    fn image(&self, slice: usize, values: &[f32]) -> Result<Image, VolumeError> {
-        let mut out = reserve(self.across * self.down)?;
-        out.extend(self.voxel_indices(slice).map(|at| values[at]));
-        Ok(Image { width: self.across, height: self.down, values: out })
+    /// Returns the number of voxels of a slice.
+    fn pixels(&self) -> usize {
+        self.across * self.down
     }
 }
 
 /// Multiplies the flow between two images at each pixel by its confidence: the share of the squared difference of the
 /// images, summed over a window, that warping removes (1 if the warped images agree, 0 if warping does not reduce the
 /// difference). Where the flow does not fit, slices are then interpolated without it.
-fn weighted_by_confidence(before: &Image, after: &Image, mut flow: Flow) -> Result<Flow, VolumeError> {
+async fn weighted_by_confidence(
+    before: &Image,
+    after: &Image,
+    mut flow: Flow,
+    pauses: &Pauses,
+) -> Result<Flow, VolumeError> {
+    pauses.now().await;
     let (left, right) = (before.warped(&flow, -0.5)?, after.warped(&flow, 0.5)?);
+    pauses.now().await;
     let moved = squared_differences(&left, &right)?;
+    pauses.now().await;
     let still = squared_differences(before, after)?;
+    pauses.now().await;
     for i in 0..moved.values.len() {
         let left = if still.values[i] > 0.0 { moved.values[i] / still.values[i] } else { 1.0 };
         let share = if left < 1.0 { 1.0 - left } else { 0.0 };

@@ -195,8 +195,8 @@ fn between(x: f32, n: usize) -> (usize, usize, f32) {
     (index, if index + 1 < n { index + 1 } else { index }, share)
 }
 
-/// Returns the symmetric optical flow between two images of one size; used for interpolated slices. Pauses before each
-/// iteration.
+/// Returns the symmetric optical flow between two images of one size; used for interpolated slices. Pauses between
+/// passes over the images.
 ///
 /// # Errors
 /// [`VolumeError::TooLarge`].
@@ -217,23 +217,26 @@ pub(super) async fn symmetric_flow(a: &Image, b: &Image, pauses: &Pauses) -> Res
         }
         for _ in 0..if level == 0 && levels.len() > 1 { FINEST_ITERATIONS } else { ITERATIONS } {
             pauses.now().await;
-            iterate(a, b, &mut flow)?;
+            iterate(a, b, &mut flow, pauses).await?;
         }
     }
     Ok(flow)
 }
 
 /// Improves the flow between `a` and `b` by one least-squares iteration and smooths it by window means.
-fn iterate(a: &Image, b: &Image, flow: &mut Flow) -> Result<(), VolumeError> {
+async fn iterate(a: &Image, b: &Image, flow: &mut Flow, pauses: &Pauses) -> Result<(), VolumeError> {
     let (before, after) = (a.warped(flow, -0.5)?, b.warped(flow, 0.5)?);
-    let equations = NormalEquations::of(&before, &after)?;
+    pauses.now().await;
+    let equations = NormalEquations::of(&before, &after, pauses).await?;
     for i in 0..before.values.len() {
         let (x, y) = equations.step(i);
         flow.x.values[i] += x;
         flow.y.values[i] += y;
     }
+    pauses.now().await;
     // Without smoothing, the flow follows the noise: interpolated slices of a heart were then no better than means.
     flow.x = flow.x.window_means()?;
+    pauses.now().await;
     flow.y = flow.y.window_means()?;
     Ok(())
 }
@@ -250,7 +253,7 @@ struct NormalEquations {
 }
 
 impl NormalEquations {
-    fn of(before: &Image, after: &Image) -> Result<Self, VolumeError> {
+    async fn of(before: &Image, after: &Image, pauses: &Pauses) -> Result<Self, VolumeError> {
         let (width, height) = (before.width, before.height);
         let empty = || Image::flat(width, height, 0.0);
         let [mut xx, mut xy, mut yy, mut xd, mut yd] = [empty()?, empty()?, empty()?, empty()?, empty()?];
@@ -275,11 +278,15 @@ impl NormalEquations {
                 yd[x] = gy * difference;
             }
         }
+        pauses.now().await;
         let squares: f32 = xx.values.iter().zip(&yy.values).map(|(a, b)| a + b).sum();
         let window = ((2 * RADIUS + 1) * (2 * RADIUS + 1)) as f32;
         let regularisation = REGULARISATION * window * squares / (width * height) as f32;
-        let [xx, xy, yy] = [xx.window_sums()?, xy.window_sums()?, yy.window_sums()?];
-        Ok(Self { xx, xy, yy, xd: xd.window_sums()?, yd: yd.window_sums()?, regularisation })
+        for products in [&mut xx, &mut xy, &mut yy, &mut xd, &mut yd] {
+            *products = products.window_sums()?;
+            pauses.now().await;
+        }
+        Ok(Self { xx, xy, yy, xd, yd, regularisation })
     }
 
     /// Returns the change of the flow along x and y at pixel number `i`: the solution of its normal equations, limited

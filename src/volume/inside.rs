@@ -1,10 +1,11 @@
 //! Voxelisation: which voxels are inside a closed surface.
 
-use super::row_sweep::{for_each_slice, span};
+use super::row_sweep::{TRIANGLES_PER_UNIT, slices, span};
 use crate::math::crossing::{crossing, is_beyond};
 use crate::math::order::{combined_rank, sort_ranks};
 use crate::math::{DVec2, DVec3};
 use crate::mesh::TriangleMesh;
+use crate::pauses::{Pauses, finished};
 use fixedbitset::FixedBitSet;
 use std::ops::Range;
 
@@ -29,13 +30,23 @@ impl FillRule {
 /// Returns, for each voxel of a grid of `dims`, x fastest, whether its centre is inside the closed `surface`, whose
 /// positions are voxel indices, by [`FillRule::EvenOdd`]. Used to find regions that a deformable model does not cover.
 ///
-/// Exact, as [`for_each_inside`].
+/// Exact, as [`visit_inside`].
 pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {
     let positions: Vec<DVec3> = surface.positions.iter().map(|p| p.as_dvec3()).collect();
     let mut inside = FixedBitSet::with_capacity(dims.iter().product());
     let surface = (&positions[..], &surface.triangles[..]);
     for_each_inside(surface, dims, FillRule::EvenOdd, |range| inside.insert_range(range));
     inside
+}
+
+/// Does what [`visit_inside`] does, without pauses.
+fn for_each_inside(
+    surface: (&[DVec3], &[[u32; 3]]),
+    dims: [usize; 3],
+    rule: FillRule,
+    visit: impl FnMut(Range<usize>),
+) {
+    finished(visit_inside(surface, dims, rule, visit, &Pauses::default()));
 }
 
 /// Calls `visit` with each run of voxels along x whose centres are inside a closed surface, as a range of voxel
@@ -45,19 +56,24 @@ pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {
 /// Exact: a line along each row of voxels is intersected with the triangles by exact predicates. A voxel centre on the
 /// surface counts as moved by an infinitesimal amount along x, y and z; see [`crossing`](crate::math::crossing). A
 /// surface is closed if its edges have equally many triangles in both directions; it may intersect itself.
-pub fn for_each_inside(
+/// Pauses between slices.
+pub async fn visit_inside(
     surface: (&[DVec3], &[[u32; 3]]),
     dims: [usize; 3],
     rule: FillRule,
     mut visit: impl FnMut(Range<usize>),
+    pauses: &Pauses,
 ) {
     let (positions, triangles) = surface;
     let mut crossings = Vec::new();
-    for_each_slice(surface, dims[2], 0.0, |z, near| {
+    let mut slices = slices(surface, dims[2], 0.0);
+    while let Some((z, near)) = slices.next() {
+        let mut tested = 0;
         for &t in near {
             let triangle = triangles[t as usize];
             let Some([first, last]) = span(positions, triangle, 1, 0.0, dims[1]) else { continue };
             let corners = triangle.map(|v| positions[v as usize]);
+            tested += (last - first + 1) as usize;
             for y in first..=last {
                 let at = DVec2::new(y.into(), z as f64);
                 let crossing = crossing(corners, at);
@@ -73,7 +89,8 @@ pub fn for_each_inside(
             visit_runs(row, dims[0], rule, |run| visit(start + run.start..start + run.end));
         }
         crossings.clear();
-    });
+        pauses.after(1 + tested / TRIANGLES_PER_UNIT).await;
+    }
 }
 
 /// Returns the row, within its slice, of a crossing.

@@ -62,7 +62,7 @@ pub use enrich::Enrichment;
 pub use error::VolumeError;
 pub(crate) use error::filled;
 pub use grid::{CellCache, Grid, Padding, VectorGrid};
-pub use inside::{FillRule, for_each_inside, voxels_inside};
+pub use inside::{FillRule, visit_inside, voxels_inside};
 pub use labels::LabelCount;
 pub(crate) use labels::listed;
 pub(crate) use near_iso::NotFinite;

@@ -1,35 +1,41 @@
 //! Sweep over the rows of a grid with the triangles that may reach each, for scan conversion of surfaces.
 
 use crate::math::{DVec3, Groups};
+use crate::pauses::Pauses;
 
 /// Calls `visit` for each row of voxels along x that a triangle may reach, rows in order: with y and z of the row and
-/// the indices of the triangles whose bounding boxes come within `reach` voxels of it, in a deterministic order.
-/// `positions` are in voxel indices; `dims` are the dimensions of the grid.
+/// the indices of the triangles whose bounding boxes come within `reach` voxels of it, in a deterministic order. Pauses
+/// between slices. `positions` are in voxel indices; `dims` are the dimensions of the grid.
 ///
 /// Memory is linear in the number of triangles and in that of slices and rows of a slice, whatever else the size of the
 /// grid.
-pub(super) fn for_each_row(
+pub(super) async fn for_each_row(
     (positions, triangles): (&[DVec3], &[[u32; 3]]),
     dims: [usize; 3],
     reach: f64,
     mut visit: impl FnMut(usize, usize, &[u32]),
+    pauses: &Pauses,
 ) {
-    for_each_slice((positions, triangles), dims[2], reach, |z, in_slice| {
-        let rows = |t: u32| span(positions, triangles[t as usize], 1, reach, dims[1]);
-        for_each_step(in_slice, dims[1], rows, |y, in_row| visit(y, z, in_row));
-    });
+    let mut slices = slices((positions, triangles), dims[2], reach);
+    while let Some((z, in_slice)) = slices.next() {
+        let span = |t: u32| span(positions, triangles[t as usize], 1, reach, dims[1]);
+        let (mut rows, mut tested) = (Steps::new(in_slice, dims[1], span), 0);
+        while let Some((y, in_row)) = rows.next() {
+            visit(y, z, in_row);
+            tested += in_row.len();
+        }
+        pauses.after(1 + tested / TRIANGLES_PER_UNIT).await;
+    }
 }
 
-/// Calls `visit` for each of `count` slices across z that a triangle may reach, in order: with z and the indices of the
-/// triangles whose bounding boxes come within `reach` voxels of it, in a deterministic order.
-pub(super) fn for_each_slice(
-    (positions, triangles): (&[DVec3], &[[u32; 3]]),
-    count: usize,
-    reach: f64,
-    visit: impl FnMut(usize, &[u32]),
-) {
+/// Triangles in rows of voxels that are a unit of work.
+pub(super) const TRIANGLES_PER_UNIT: usize = 32;
+
+/// Returns those of `count` slices across z that a triangle may reach, in order: z and the indices of the triangles whose
+/// bounding boxes come within `reach` voxels of it, in a deterministic order.
+pub(super) fn slices((positions, triangles): (&[DVec3], &[[u32; 3]]), count: usize, reach: f64) -> Steps {
     let all: Vec<u32> = (0..triangles.len() as u32).collect();
-    for_each_step(&all, count, |t| span(positions, triangles[t as usize], 2, reach, count), visit);
+    Steps::new(&all, count, |t| span(positions, triangles[t as usize], 2, reach, count))
 }
 
 /// Returns the first and the last of `count` layers of voxels along `axis` that the bounding box of a triangle comes
@@ -65,25 +71,40 @@ fn span_of(low: f64, high: f64, count: usize) -> Option<[u32; 2]> {
     (first <= last).then_some([first as u32, last as u32])
 }
 
-/// Calls `visit` for each number below `count` that some item's span contains, in order, with these items.
-fn for_each_step(
-    items: &[u32],
+/// The numbers below a count that some item's span contains, in order, with these items.
+pub(super) struct Steps {
     count: usize,
-    span: impl Fn(u32) -> Option<[u32; 2]>,
-    mut visit: impl FnMut(usize, &[u32]),
-) {
-    let spans = items.iter().filter_map(|&item| Some((item, span(item)?)));
-    let by_first = Groups::new(count, spans.map(|(item, [first, last])| (first, (item, last))));
-    let (mut active, mut last) = (Vec::new(), Vec::new());
-    for step in 0..count {
-        for &(item, end) in by_first.of(step) {
-            active.push(item);
-            last.push(end);
+    /// Items and the ends of their spans, by the beginnings of these.
+    by_first: Groups<(u32, u32)>,
+    /// The next number.
+    step: usize,
+    /// The items whose spans contain the last number, and the ends of their spans.
+    active: Vec<u32>,
+    last: Vec<u32>,
+}
+
+impl Steps {
+    fn new(items: &[u32], count: usize, span: impl Fn(u32) -> Option<[u32; 2]>) -> Self {
+        let spans = items.iter().filter_map(|&item| Some((item, span(item)?)));
+        let by_first = Groups::new(count, spans.map(|(item, [first, last])| (first, (item, last))));
+        Self { count, by_first, step: 0, active: Vec::new(), last: Vec::new() }
+    }
+
+    /// Returns the next number, and the items whose spans contain it.
+    pub(super) fn next(&mut self) -> Option<(usize, &[u32])> {
+        while self.step < self.count {
+            let step = self.step;
+            self.step += 1;
+            drop_ended(&mut self.active, &mut self.last, step as u32);
+            for &(item, end) in self.by_first.of(step) {
+                self.active.push(item);
+                self.last.push(end);
+            }
+            if !self.active.is_empty() {
+                return Some((step, &self.active));
+            }
         }
-        if !active.is_empty() {
-            visit(step, &active);
-            drop_ended(&mut active, &mut last, step as u32 + 1);
-        }
+        None
     }
 }
 
@@ -104,8 +125,18 @@ fn drop_ended(active: &mut Vec<u32>, last: &mut Vec<u32>, step: u32) {
 mod tests {
     use super::*;
     use crate::math::Random;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    fn sweep(
+        surface: (&[DVec3], &[[u32; 3]]),
+        dims: [usize; 3],
+        reach: f64,
+        visit: impl FnMut(usize, usize, &[u32]),
+    ) {
+        finished(for_each_row(surface, dims, reach, visit, &Pauses::default()));
+    }
 
     #[test]
     fn rows_have_the_triangles_whose_boxes_reach_them() {
@@ -115,9 +146,8 @@ mod tests {
         let triangles: Vec<[u32; 3]> = (0..30).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
         for reach in [0.0, 0.5] {
             let (mut found, mut expected) = (Vec::new(), Vec::new());
-            for_each_row((&positions, &triangles), [5, 8, 7], reach, |y, z, reached| {
-                found.extend(reached.iter().map(|t| [z, y, *t as usize]));
-            });
+            let add = |y, z, reached: &[u32]| found.extend(reached.iter().map(|t| [z, y, *t as usize]));
+            sweep((&positions, &triangles), [5, 8, 7], reach, add);
             for (z, y, t) in (0..7 * 8 * 30).map(|i| (i / 240, i / 30 % 8, i % 30)) {
                 let reaches = |at: usize, axis: usize| {
                     let along = triangles[t].map(|v| positions[v as usize][axis] - at as f64);
@@ -136,7 +166,7 @@ mod tests {
     fn triangles_beyond_the_grid_and_not_finite_ones_reach_nothing() {
         let far = [DVec3::splat(f64::NAN), DVec3::splat(f64::INFINITY), DVec3::splat(-1e60)];
         let triangles = [[0, 0, 0], [2, 2, 2]];
-        for_each_row((&far, &triangles), [4, 4, 4], 0.5, |y, z, _| panic!("{y} {z}"));
-        for_each_row((&[], &[]), [4, 4, 4], 0.5, |y, z, _| panic!("{y} {z}"));
+        sweep((&far, &triangles), [4, 4, 4], 0.5, |y, z, _| panic!("{y} {z}"));
+        sweep((&[], &[]), [4, 4, 4], 0.5, |y, z, _| panic!("{y} {z}"));
     }
 }

@@ -1,6 +1,6 @@
 //! Stored voxel values, in the numeric type of the file or the caller.
 
-use super::error::{VolumeError, reserve};
+use super::error::{VolumeError, filled, reserve};
 use std::ops::Range;
 
 /// Array of voxel values as stored: x fastest, then y, z and time.
@@ -247,6 +247,14 @@ impl Voxels {
         self.gathered(count, std::iter::empty())
     }
 
+    /// Returns an array of the same type with `count` voxels of the value 0.
+    ///
+    /// # Errors
+    /// [`VolumeError::TooLarge`].
+    pub(crate) fn zeros_like(&self, count: usize) -> Result<Voxels, VolumeError> {
+        Ok(map_each!(self, stored => zeros(stored, count)?))
+    }
+
     /// Concatenates arrays of voxels of one type (the frames of a sequence); `None` if their types differ or `parts` is
     /// empty.
     ///
@@ -270,6 +278,11 @@ fn finite_count<T: VoxelNumber>(values: &[T]) -> usize {
 
 fn contains<T: VoxelNumber>(values: &[T], value: f64) -> bool {
     values.contains(&T::nearest(value))
+}
+
+/// Returns `count` zeros of the number type of `_stored`.
+fn zeros<T: VoxelNumber>(_stored: &[T], count: usize) -> Result<Vec<T>, VolumeError> {
+    filled(count, T::nearest(0.0))
 }
 
 /// Converts `values` to the number type of `_stored`.

@@ -15,8 +15,10 @@
 
 use crate::math::{DAffine3, DVec3};
 use crate::mesh::{MeshError, TriangleMesh};
+use crate::pauses::{Pauses, finished};
 use crate::spatial::lattice_distances;
-use crate::volume::{FillRule, Volume, VolumeError, Voxels, coverage, filled, for_each_inside};
+use crate::volume::{FillRule, Volume, VolumeError, Voxels, coverage, filled, visit_inside};
+use std::ops::Range;
 
 /// Quantity that [`voxelise`] computes per voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,21 +49,35 @@ pub enum VoxeliseError {
 ///
 /// Inside is where the winding number, the number of times the surface encloses a point, is not 0, whether triangles
 /// face outwards or inwards. For [`VoxelKind::Mask`] and the sign of distances this is decided exactly
-/// ([`for_each_inside`]), for vertices mapped to voxel indices in double precision. See [`coverage`] and
+/// ([`visit_inside`]), for vertices mapped to voxel indices in double precision. See [`coverage`] and
 /// [`lattice_distances`] for the accuracy of the others.
 ///
 /// # Errors
 /// [`MeshError::NotClosed`] as [`TriangleMesh::check_closed`]; [`MeshError::InvalidArgument`] for distances from a mesh
 /// without triangles; [`VolumeError::InvalidArgument`] for a mask of value 0; [`VolumeError::TooLarge`].
 pub fn voxelise(mesh: &TriangleMesh, like: &Volume, kind: VoxelKind) -> Result<Volume, VoxeliseError> {
+    finished(voxelise_in_slices(mesh, like, kind, &Pauses::default()))
+}
+
+/// Does what [`voxelise`] does, and pauses meanwhile.
+///
+/// # Errors
+/// As [`voxelise`].
+pub async fn voxelise_in_slices(
+    mesh: &TriangleMesh,
+    like: &Volume,
+    kind: VoxelKind,
+    pauses: &Pauses,
+) -> Result<Volume, VoxeliseError> {
     mesh.check_closed()?;
+    pauses.now().await;
     let dims = like.dims();
     let positions = in_voxels(mesh, like);
     let surface = (&positions[..], &mesh.triangles[..]);
     let voxels = match kind {
-        VoxelKind::Mask { value } => mask(surface, dims, value)?,
-        VoxelKind::Coverage => Voxels::F32(coverage(surface, dims)?),
-        VoxelKind::Distance => Voxels::F32(signed_distances(mesh, surface, like)?),
+        VoxelKind::Mask { value } => mask(surface, dims, value, pauses).await?,
+        VoxelKind::Coverage => Voxels::F32(coverage(surface, dims, pauses).await?),
+        VoxelKind::Distance => Voxels::F32(signed_distances(mesh, surface, like, pauses).await?),
     };
     Ok(like.with_voxels(voxels)?)
 }
@@ -74,11 +90,17 @@ fn in_voxels(mesh: &TriangleMesh, like: &Volume) -> Vec<DVec3> {
 
 /// Returns voxels of intensity `value` inside a surface, and 0 outside, in the smallest unsigned type that holds
 /// `value`.
-fn mask(surface: (&[DVec3], &[[u32; 3]]), dims: [usize; 3], value: u32) -> Result<Voxels, VolumeError> {
+async fn mask(
+    surface: (&[DVec3], &[[u32; 3]]),
+    dims: [usize; 3],
+    value: u32,
+    pauses: &Pauses,
+) -> Result<Voxels, VolumeError> {
     macro_rules! filled {
         ($value:expr) => {{
             let mut voxels = filled(dims.iter().product(), 0)?;
-            for_each_inside(surface, dims, FillRule::NonZero, |run| voxels[run].fill($value));
+            let fill = |run: Range<usize>| voxels[run].fill($value);
+            visit_inside(surface, dims, FillRule::NonZero, fill, pauses).await;
             voxels
         }};
     }
@@ -97,19 +119,22 @@ fn mask(surface: (&[DVec3], &[[u32; 3]]), dims: [usize; 3], value: u32) -> Resul
 
 /// Returns the signed distance of each voxel centre of `like` from the surface of `mesh`, which is also given in voxel
 /// indices.
-fn signed_distances(
+async fn signed_distances(
     mesh: &TriangleMesh,
     surface: (&[DVec3], &[[u32; 3]]),
     like: &Volume,
+    pauses: &Pauses,
 ) -> Result<Vec<f32>, VoxeliseError> {
     let dims = like.dims();
     let mut distances = filled(dims.iter().product(), 0.0)?;
     let to_mesh = DAffine3::from_translation(-mesh.origin) * like.affine();
-    lattice_distances(mesh, &to_mesh, dims, &mut distances)?;
-    for_each_inside(surface, dims, FillRule::NonZero, |run| {
+    lattice_distances(mesh, &to_mesh, dims, &mut distances, pauses).await?;
+    pauses.now().await;
+    let negate = |run: Range<usize>| {
         // A difference, so that a distance of 0 does not become −0.
         distances[run].iter_mut().for_each(|d| *d = 0.0 - *d);
-    });
+    };
+    visit_inside(surface, dims, FillRule::NonZero, negate, pauses).await;
     Ok(distances)
 }
 

@@ -11,11 +11,11 @@ const ALLOWED: [(&str, &[&str]); 10] = [
     ("warning", &[]),
     ("pauses", &[]),
     ("math", &[]),
-    ("mesh", &["math"]),
+    ("mesh", &["math", "pauses"]),
     ("spatial", &["math", "mesh", "pauses"]),
     ("volume", &["math", "mesh", "pauses", "warning"]),
     ("io", &["math", "mesh", "volume", "warning"]),
-    ("voxelise", &["math", "mesh", "spatial", "volume"]),
+    ("voxelise", &["math", "mesh", "pauses", "spatial", "volume"]),
     ("remesh", &["math", "mesh", "pauses", "spatial", "volume"]),
     ("methods", &["math", "mesh", "pauses", "spatial", "volume", "remesh", "warning"]),
 ];

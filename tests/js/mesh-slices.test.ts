@@ -1,6 +1,6 @@
 // Long operations of meshes in slices of work: the same results, aborts, and what is refused meanwhile.
 import { expect, test } from 'vitest';
-import { Mesh, type MeshInSlices } from '../../pkg/index.js';
+import { Mesh, type MeshInSlices, Volume } from '../../pkg/index.js';
 import { failure, rejection, wrong } from './helpers.js';
 
 /** Returns a bumpy sphere as a list of triangles, on which each operation has many slices. */
@@ -13,6 +13,7 @@ function bumpy(): Mesh {
 }
 
 const EDGE = { min: 0.04, max: 0.12 };
+const GRID = new Volume({ data: new Uint8Array(30 ** 3), dims: [30, 30, 30], spacing: [0.1, 0.1, 0.1], origin: [-1.5, -1.5, -1.5] });
 const OTHER = Mesh.icosphere([0.1, 0, 0], 1, 0.1);
 
 /** Each operation, which both kinds of objects have. */
@@ -22,11 +23,14 @@ const OPERATIONS: Record<keyof MeshInSlices, (mesh: Mesh | MeshInSlices) => unkn
   decimate: (mesh) => mesh.decimate(1000.5),
   decimateWithin: (mesh) => mesh.decimateWithin(0.01, { targetTriangles: 500 }),
   smooth: (mesh) => mesh.smooth({ iterations: 3 }),
+  toVolume: async (mesh) => (await mesh.toVolume(GRID, { kind: 'distance' })).frame(0),
+  check: (mesh) => mesh.check(),
   distanceTo: (mesh) => mesh.distanceTo(OTHER),
 };
 
 const NAMES = Object.keys(OPERATIONS) as (keyof MeshInSlices)[];
-const CHANGES = NAMES.filter((name) => name !== 'distanceTo');
+const READS: (keyof MeshInSlices)[] = ['toVolume', 'check', 'distanceTo'];
+const CHANGES = NAMES.filter((name) => !READS.includes(name));
 
 /** Everything that may be seen of a mesh. */
 const state = (mesh: Mesh) => [mesh.arrays(), mesh.topologyVersion, mesh.geometryVersion, mesh.origin];
@@ -40,7 +44,7 @@ test.each(NAMES)('%s in slices: the same bits, and others have their turn meanwh
   refined.refine();
   for (const mesh of [bumpy(), refined]) {
     const other = mesh.clone();
-    const expected = OPERATIONS[name](other);
+    const expected = await OPERATIONS[name](other);
     let turns = 0;
     const count = () => {
       turns += 1;
@@ -103,6 +107,36 @@ test('what would change a mesh is refused while an operation in slices does, and
   await work;
   expect(state(mesh)).toEqual(state(after));
   mesh.refine();
+});
+
+/** Returns a torus whose vertices are anywhere, so that all its triangles intersect. */
+function tangle(side: number): Mesh {
+  let seed = 7;
+  const random = () => {
+    seed = (seed * 1103515245 + 12345) & 0x7fffffff;
+    return seed / 0x7fffffff;
+  };
+  const positions = Float32Array.from({ length: 3 * side * side }, random);
+  const at = (i: number, j: number) => (i % side) * side + (j % side);
+  const quads = Array.from({ length: side * side }, (_, k) => [Math.floor(k / side), k % side] as const);
+  const indices = quads.flatMap(([i, j]) => {
+    const [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+    return [a, b, c, a, c, d];
+  });
+  return Mesh.fromArrays(positions, Uint32Array.from(indices));
+}
+
+test.each(['smooth', 'check', 'toVolume'] as const)('%s pauses also where everything intersects', async (name) => {
+  const mesh = tangle(30);
+  let turns = 0;
+  const count = () => {
+    turns += 1;
+    immediate = setImmediate(count);
+  };
+  let immediate = setImmediate(count);
+  await OPERATIONS[name](mesh.inSlices(SHORT));
+  clearImmediate(immediate);
+  expect(turns).toBeGreaterThan(15);
 });
 
 test('a distance is that of the meshes at the call', async () => {

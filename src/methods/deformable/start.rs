@@ -187,7 +187,7 @@ impl DeformableModel {
             let sampling = self.sampling();
             let guard = self.resolver.embedding(&self.mesh, sampling);
             let intersecting = guard.intersecting_vertices_in_slices(&self.mesh, pauses).await;
-            if intersecting.is_empty() || guard.separate(&mut self.mesh, &intersecting) {
+            if intersecting.is_empty() || guard.separate(&mut self.mesh, &intersecting, pauses).await {
                 self.convergence.began_on_contour = self.from_contour;
                 return Ok(());
             }

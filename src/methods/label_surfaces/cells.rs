@@ -176,7 +176,8 @@ impl<'a> RowOfCells<'a> {
         let mut before = is_uniform(0);
         (1..a.len()).map(move |i| {
             let here = is_uniform(i);
-            !(here && std::mem::replace(&mut before, here) && a[i] == a[i - 1])
+            let last = std::mem::replace(&mut before, here);
+            !(here && last && a[i] == a[i - 1])
         })
     }
 }
@@ -184,7 +185,9 @@ impl<'a> RowOfCells<'a> {
 /// Returns the number of cells of a box that surfaces of `grid` pass through.
 pub fn count_cells(grid: &LabelGrid, area: &CellBox) -> usize {
     let rows = area.rows().map(|row| RowOfCells::new(grid, &row));
-    rows.filter(|row| !row.is_uniform()).map(|row| row.crossed().filter(|&is_crossed| is_crossed).count()).sum()
+    rows.filter(|row| !row.is_uniform())
+        .map(|row| row.crossed().filter(|&is_crossed| is_crossed).count())
+        .sum()
 }
 
 /// All cells through which surfaces pass, each in a slot that it keeps as long as it is stored.

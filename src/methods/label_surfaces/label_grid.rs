@@ -3,6 +3,7 @@
 use crate::math::order::{rank_f64, sort_by_rank};
 use crate::methods::MethodError;
 use crate::methods::saved::Hash;
+use crate::pauses::Pauses;
 use crate::volume::{Region, Volume, VolumeError};
 use std::collections::BTreeMap;
 
@@ -10,6 +11,9 @@ use std::collections::BTreeMap;
 pub const BACKGROUND: u16 = 0;
 /// Largest number of labels with surfaces.
 const MOST_LABELS: usize = u16::MAX as usize;
+
+/// The number of voxels that are read in a unit of work.
+const VOXELS_PER_UNIT: usize = 500;
 
 /// A label map with a layer of background around it.
 #[derive(Clone, Debug)]
@@ -28,15 +32,20 @@ pub struct LabelGrid {
 }
 
 impl LabelGrid {
-    /// Reads the first frame of a label map; `wanted` are the labels that get surfaces, all if not given.
+    /// Reads the first frame of a label map, and pauses meanwhile; `wanted` are the labels that get surfaces, all if not
+    /// given.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if `wanted` has a value that is not a label of the volume; an error about the
     /// volume if it is no label map, or too large.
-    pub fn new(volume: &Volume, wanted: Option<Vec<f64>>) -> Result<Self, MethodError> {
-        let present = volume.labels(0)?;
+    pub async fn new(
+        volume: &Volume,
+        wanted: Option<Vec<f64>>,
+        pauses: &Pauses,
+    ) -> Result<Self, MethodError> {
         if let Some(wanted) = &wanted {
-            check_wanted(wanted, &present.iter().map(|label| label.value).collect::<Vec<_>>())?;
+            check_wanted(wanted, &volume.labels(0)?.iter().map(|label| label.value).collect::<Vec<_>>())?;
+            pauses.now().await;
         }
         let dims = volume.dims();
         let mut numbers = reserved(dims.map(|n| n + 2))?;
@@ -46,6 +55,7 @@ impl LabelGrid {
         // By layers, as reading needs memory for a copy.
         for z in 0..dims[2] {
             grid.read(volume, Region { min: [0, 0, z], dims: [dims[0], dims[1], 1] })?;
+            pauses.after(dims[0] * dims[1] / VOXELS_PER_UNIT).await;
         }
         Ok(grid)
     }

@@ -139,11 +139,17 @@ impl LabelSurfaces {
     ) -> Result<impl Future<Output = Result<Self, MethodError>> + use<>, MethodError> {
         params.check_ranges()?;
         check_precision(volume)?;
-        Ok(Self::create(LabelGrid::new(volume, labels)?, volume.affine(), params))
+        Ok(Self::create(volume.clone(), labels, params))
     }
 
-    async fn create(grid: LabelGrid, to_world: DAffine3, params: LabelParams) -> Result<Self, MethodError> {
+    async fn create(
+        volume: Volume,
+        labels: Option<Vec<f64>>,
+        params: LabelParams,
+    ) -> Result<Self, MethodError> {
         let pauses = Pauses::default();
+        let (to_world, grid) = (volume.affine(), LabelGrid::new(&volume, labels, &pauses).await?);
+        drop(volume);
         let nets = Nets::new(grid, to_world, &pauses).await?;
         let everywhere = nets.everywhere();
         let mut surfaces = Self {

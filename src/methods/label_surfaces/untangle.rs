@@ -438,7 +438,7 @@ mod tests {
         let scale = DVec3::new(0.5 + random.unit(), 0.5 + random.unit(), 0.5 + 4.0 * random.unit());
         let affine = DAffine3::from_scale(scale);
         let volume = Volume::new(VolumeInit { affine, ..init }).unwrap();
-        let grid = LabelGrid::new(&volume, None).unwrap();
+        let grid = finished(LabelGrid::new(&volume, None, &Pauses::default())).unwrap();
         finished(Nets::new(grid, affine, &Pauses::default())).unwrap()
     }
 

@@ -2,6 +2,7 @@
 
 use super::correspondence::{BasePoint, Correspondence};
 use crate::mesh::{TriangleMesh, intersecting_parts};
+use crate::pauses::Pauses;
 use crate::remesh::{Embedding, PairsOfParts};
 use crate::warning::{Warning, WarningCode};
 use std::collections::BTreeSet;
@@ -17,10 +18,11 @@ pub(super) struct Crossings {
 }
 
 impl Crossings {
-    pub fn of(surface: &TriangleMesh) -> Self {
+    /// Finds them, and pauses meanwhile.
+    pub async fn of(surface: &TriangleMesh, pauses: &Pauses) -> Self {
         let parts = surface.component_of_each_vertex();
         let part_of: Vec<u32> = surface.triangles.iter().map(|corners| parts[corners[0] as usize]).collect();
-        let pairs = intersecting_parts(surface, &part_of);
+        let pairs = intersecting_parts(surface, &part_of, pauses).await;
         if pairs.as_ref().is_some_and(BTreeSet::is_empty) {
             return Self::default();
         }

@@ -55,6 +55,9 @@ const MOST_ADDED: usize = 15_000;
 /// Maximum number of passes in which edges of the given surface are halved: each halves the longest.
 const PASSES: usize = 40;
 
+/// Number of edges that are halved between two pauses: around a vertex of thousands of edges, each takes a millisecond.
+const EDGES_AT_ONCE: usize = 64;
+
 /// A surface with the point of the given one for each vertex.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Placed {
@@ -118,17 +121,21 @@ impl Held {
         let most = given.vertex_count() + MOST_ADDED;
         for _ in 0..PASSES {
             pauses.now().await;
-            let length = |now: &Placed, u, v| f64::from(now.mesh.position(u).distance(now.mesh.position(v)));
-            if halve_edges(&mut start, walker, |now, u, v| length(now, u, v) > longest, Mesh::split) == 0
-                || start.mesh.vertex_count() >= most
-            {
+            let length = |u, v| f64::from(start.mesh.position(u).distance(start.mesh.position(v)));
+            let before = start.mesh.vertex_count();
+            for some in long_edges(&start.mesh, |u, v| length(u, v) > longest).chunks(EDGES_AT_ONCE) {
+                pauses.now().await;
+                halve_edges(&mut start, walker, some, Mesh::split);
+            }
+            let count = start.mesh.vertex_count();
+            if count == before || count >= most {
                 break;
             }
         }
         let reach = REACH * f64::from(bounds.min.distance(bounds.max));
         let mut now = start.clone();
         pauses.now().await;
-        let crossings = Crossings::of(walker.mesh());
+        let crossings = Crossings::of(walker.mesh(), pauses).await;
         let mut held = Self {
             handles: Vec::new(),
             reach,
@@ -141,9 +148,11 @@ impl Held {
             halvings: 0,
             crossings,
         };
+        let whole = SurfaceWalker::new(now.mesh.to_triangles())?;
+        whole.build_tree(pauses).await;
         for ellipsoid in ellipsoids {
             pauses.now().await;
-            held.add(Ellipsoid::new(ellipsoid), &mut now)?;
+            held.add(Ellipsoid::new(ellipsoid), &mut now, &whole);
         }
         held.distances = now.distances;
         Ok(held)
@@ -173,12 +182,10 @@ impl Held {
         self.handles.iter_mut().zip(poses).for_each(|(handle, &pose)| handle.move_to(pose));
     }
 
-    /// Adds a handle with a pose in which it leaves the surface `now` unchanged; distances from it are added to `now`.
-    ///
-    /// # Errors
-    /// [`MeshError`] if memory does not suffice.
-    pub fn add(&mut self, pose: Ellipsoid, now: &mut Placed) -> Result<(), MeshError> {
-        let gripped = gripped(&pose, &SurfaceWalker::new(now.mesh.to_triangles())?);
+    /// Adds a handle with a pose in which it leaves the surface `now` unchanged, of which `walker` has the vertices in the same
+    /// order; distances from it are added to `now`.
+    pub fn add(&mut self, pose: Ellipsoid, now: &mut Placed, walker: &SurfaceWalker) {
+        let gripped = gripped(&pose, walker);
         let ids: Vec<VertexId> = now.mesh.vertices().collect();
         let at_grip = gripped.iter().min_by(|a, b| a.1.total_cmp(&b.1));
         let motion = at_grip.and_then(|&(v, _)| self.motion_of(now, ids[v as usize]));
@@ -190,7 +197,6 @@ impl Held {
         self.handles.push(handle);
         now.distances = with_column(&now.distances, before, &found);
         self.start.distances = with_column(&self.start.distances, before, &found[..self.start.mesh.slots()]);
-        Ok(())
     }
 
     /// Removes the handles from a number on; also their distances in `now`.
@@ -292,12 +298,13 @@ impl Held {
         let moving: Vec<VertexId> =
             now.mesh.vertices().filter(|v| displacements[v.index()] != Vec3::ZERO).collect();
         guard.move_some_unless(&mut now.mesh, &moving, &mut displacements, most)?;
-        let is_stretched = |now: &Placed, u: VertexId, v: VertexId| {
+        let is_stretched = |u: VertexId, v: VertexId| {
             let [p, q] = [u, v].map(|end| now.points[end.index()].point);
             let length = targets[u.index()].distance(targets[v.index()]);
             length > longest && length > STRETCH * p.distance(q)
         };
-        let split = halve_edges(now, surface, is_stretched, |mesh, u, v, at| {
+        let stretched = long_edges(&now.mesh, is_stretched);
+        let split = halve_edges(now, surface, &stretched, |mesh, u, v, at| {
             guard.attempt(mesh, |mesh| mesh.split(u, v, at))
         });
         // The new vertices are moved in the next frame.
@@ -417,8 +424,10 @@ impl MultiresolutionModel {
             distances: std::mem::take(&mut held.distances),
         };
         held.keep(given.len(), &mut now);
-        for added in &given[held.handles.len()..] {
-            held.add(Ellipsoid::new(added), &mut now)?;
+        let added = &given[held.handles.len()..];
+        if !added.is_empty() {
+            let walker = SurfaceWalker::new(now.mesh.to_triangles())?;
+            added.iter().for_each(|added| held.add(Ellipsoid::new(added), &mut now, &walker));
         }
         self.put_placed(now, held);
         Ok(())
@@ -485,22 +494,26 @@ fn middle_of(ends: [BasePoint; 2], surface: &SurfaceWalker) -> BasePoint {
     to_base_point(surface, &found)
 }
 
-/// Halves all edges that `is_long` once, longest first, by `split`, which may refuse; returns their number. New vertices are
-/// in the middle of the edges, and on the given surface in the middle of the places of their ends: an edge is always on one
-/// of its triangles.
-fn halve_edges(
-    now: &mut Placed,
-    surface: &SurfaceWalker,
-    is_long: impl Fn(&Placed, VertexId, VertexId) -> bool,
-    mut split: impl FnMut(&mut Mesh, VertexId, VertexId, Vec3) -> Result<VertexId, EditError>,
-) -> usize {
-    let square = |(u, v): (VertexId, VertexId)| now.mesh.position(u).distance_squared(now.mesh.position(v));
-    let long = now.mesh.edges().filter(|&(u, v)| is_long(now, u, v));
+/// Returns the edges that are long, longest first.
+fn long_edges(mesh: &Mesh, is_long: impl Fn(VertexId, VertexId) -> bool) -> Vec<(VertexId, VertexId)> {
+    let square = |(u, v): (VertexId, VertexId)| mesh.position(u).distance_squared(mesh.position(v));
+    let long = mesh.edges().filter(|&(u, v)| is_long(u, v));
     let mut long: Vec<_> = long.map(|edge| (square(edge), edge)).collect();
     sort_by_rank(&mut long, |&(_, (u, v))| combined_rank(u.0, v.0));
     sort_by_rank(&mut long, |&(square, _)| (!rank_f32(square)).into());
+    long.into_iter().map(|(_, edge)| edge).collect()
+}
+
+/// Halves edges in turn by `split`, which may refuse; returns their number. New vertices are in the middle of the edges, and
+/// on the given surface in the middle of the places of their ends: an edge is always on one of its triangles.
+fn halve_edges(
+    now: &mut Placed,
+    surface: &SurfaceWalker,
+    edges: &[(VertexId, VertexId)],
+    mut split: impl FnMut(&mut Mesh, VertexId, VertexId, Vec3) -> Result<VertexId, EditError>,
+) -> usize {
     let before = now.mesh.vertex_count();
-    for (_, (u, v)) in long {
+    for &(u, v) in edges {
         if now.mesh.vertex_count() >= MAX_VERTICES {
             break;
         }

@@ -237,7 +237,7 @@ impl MultiresolutionModel {
         }
         let space = ModelSpace::of(Some(&detail), &given);
         pauses.now().await;
-        let (surface, params) = set_up_surface(space.mesh(detail), space.params(&params))?;
+        let (surface, params) = set_up_surface(space.mesh(detail), space.params(&params), pauses).await?;
         pauses.now().await;
         let mut ellipsoids = space.ellipsoids(&given);
         if ellipsoids.is_empty() {
@@ -247,6 +247,7 @@ impl MultiresolutionModel {
         let held = Held::in_slices(&surface, &ellipsoids, params.edge_max, pauses).await?;
         pauses.now().await;
         let Placed { mesh, points, .. } = held.start().clone();
+        pauses.now().await;
         let shown = identity(&surface.walker);
         let detailed = Detailed {
             mesh: Mesh::from_triangles(surface.walker.mesh())?,
@@ -254,10 +255,13 @@ impl MultiresolutionModel {
             unmatched_vertices: 0,
             held_vertices: 0,
         };
+        pauses.now().await;
+        let components = measure(surface.walker.mesh()).components as u32;
+        pauses.now().await;
         Ok(Self {
             params: space.params_in_world(&params),
             space,
-            components: measure(surface.walker.mesh()).components as u32,
+            components,
             bands: Bands::new(vec![surface], pauses).await,
             ellipsoids: MovingEllipsoids::new(&ellipsoids),
             model_params: params,

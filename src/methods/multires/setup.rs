@@ -38,19 +38,19 @@ pub(super) async fn set_up(
     };
     let bands = match (detail, base) {
         (detail, Some(base)) => {
-            let base = validate_closed("base", base)?;
+            let base = validate_closed("base", base, pauses).await?;
             pauses.now().await;
             check_embedded(&base)?;
             pauses.now().await;
             let params = sized(measure(&base).area)?;
             let mut bands = vec![Band::of(base)?];
             if let Some(detail) = detail {
-                bands.push(Band::of(validate_closed("detail", detail)?)?);
+                bands.push(Band::of(validate_closed("detail", detail, pauses).await?)?);
             }
             (bands, params)
         }
         (Some(detail), None) => {
-            let detail = validate_closed("detail", detail)?;
+            let detail = validate_closed("detail", detail, pauses).await?;
             let params = sized(measure(&detail).area)?;
             pauses.now().await;
             (decomposition(detail, ellipsoids, &params, pauses).await?, params)
@@ -65,24 +65,30 @@ pub(super) async fn set_up(
     Ok(bands)
 }
 
-/// Validates a surface that is to hold itself. Returns it, and the parameters with edge bounds of 0 replaced by defaults.
+/// Validates a surface that is to hold itself, and pauses meanwhile. Returns it, and the parameters with edge bounds of 0 replaced by defaults.
 ///
 /// # Errors
 /// As [`set_up`].
-pub(super) fn set_up_surface(
+pub(super) async fn set_up_surface(
     detail: TriangleMesh,
     params: MultiresParams,
+    pauses: &Pauses,
 ) -> Result<(Rc<Band>, MultiresParams), MethodError> {
     // As it is, with the order of its vertices, unless vertices have to be merged first.
     let is_closed =
         Mesh::from_triangles(&detail).is_ok_and(|mesh| mesh.vertex_count() == detail.positions.len());
-    let detail = if is_closed { detail } else { validate_closed("detail", detail)? };
+    let detail = if is_closed { detail } else { validate_closed("detail", detail, pauses).await? };
+    pauses.now().await;
     check_edges("detail", &detail)?;
     let area = measure(&detail).area;
     let params = params.with_target(edge_for(area, DEFAULT_TRIANGLES));
     params.validate()?;
     check_size(area, &params)?;
-    Ok((Band::of(detail)?, params))
+    pauses.now().await;
+    let band = Band::of(detail)?;
+    pauses.now().await;
+    band.walker.build_tree(pauses).await;
+    Ok((band, params))
 }
 
 /// The error for a surface that is to hold itself, but is given with a base, or not at all.
@@ -98,10 +104,17 @@ pub(super) fn cannot_hold_itself(has_base: bool) -> MethodError {
 /// # Errors
 /// [`MethodError::Mesh`] if it is invalid, open or not manifold; [`MethodError::InvalidArgument`] naming `parameter` if
 /// its edges are too short.
-fn validate_closed(parameter: &'static str, mesh: TriangleMesh) -> Result<TriangleMesh, MethodError> {
+async fn validate_closed(
+    parameter: &'static str,
+    mesh: TriangleMesh,
+    pauses: &Pauses,
+) -> Result<TriangleMesh, MethodError> {
     mesh.validate()?;
+    pauses.now().await;
     let mesh = mesh.welded();
+    pauses.now().await;
     Mesh::from_triangles(&mesh)?;
+    pauses.now().await;
     check_edges(parameter, &mesh)?;
     Ok(mesh)
 }

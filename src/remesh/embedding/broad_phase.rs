@@ -122,9 +122,11 @@ impl Embedding {
         }
         let is_close = a.position.distance_squared(b.position) < proximity.least * proximity.least;
         for (v, w) in [(a.vertex, b.vertex), (b.vertex, a.vertex)] {
-            if self.position_of(v, w).is_none() {
+            // A list that is made anew cannot have it yet, as each pair is found once.
+            if self.is_searched_around(v) || self.position_of(v, w).is_none() {
                 // The other vertex may still have a certificate of the pair.
-                let until = self.position_of(w, v).map_or(0.0, |k| self.near(w)[k].until);
+                let known = if self.is_searched_around(w) { None } else { self.position_of(w, v) };
+                let until = known.map_or(0.0, |k| self.near(w)[k].until);
                 self.nearby[v.index()].get_or_insert_default().push(Nearby { vertex: w, until });
             }
             if is_close {

@@ -122,7 +122,7 @@ impl Embedding {
                 break;
             }
             if held.len() > most {
-                self.move_back(mesh, moving, from);
+                self.move_back(mesh, moving, from, pauses).await;
                 return None;
             }
             let before: Vec<Vec3> = held.iter().map(|&(v, _)| mesh.position(v)).collect();
@@ -145,13 +145,13 @@ impl Embedding {
         Some(shares.into_iter().collect())
     }
 
-    fn move_back(&mut self, mesh: &mut Mesh, moving: &[VertexId], to: &[Vec3]) {
+    async fn move_back(&mut self, mesh: &mut Mesh, moving: &[VertexId], to: &[Vec3], pauses: &Pauses) {
         let from: Vec<Vec3> = moving.iter().map(|&v| mesh.position(v)).collect();
         moving.iter().zip(to).for_each(|(&v, &p)| mesh.set_position(v, p));
         self.apply_motion(mesh, moving.iter().copied().zip(from));
         // Triangles that intersected are tested anew.
         moving.iter().for_each(|&v| self.mark_dirty(v, Checks::ALL));
-        self.check_dirty(mesh);
+        self.check_dirty_in_slices(mesh, pauses).await;
         self.version = Some(mesh.geometry_version());
     }
 }

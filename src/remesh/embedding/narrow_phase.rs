@@ -14,11 +14,18 @@ use crate::pauses::{Pauses, finished};
 /// The clearance of a pair, relative to the ordinary edge, above which no further filter is tried.
 const AMPLE: f32 = 0.03;
 
-/// The number of vertices that are checked between two counts of the work.
+/// The number of vertices that are checked between two counts of the work, if they have few pairs.
 const CHUNK: usize = 32;
+/// The number of pairs after which the work is counted: where a mesh intersects itself everywhere, each vertex has
+/// thousands.
+const MANY_PAIRS: usize = 32 * PAIRS_PER_UNIT;
 
 /// The number of pairs of one-rings whose tests are a unit of work.
 const PAIRS_PER_UNIT: usize = 16;
+
+/// The largest number of vertices near one that are looked through for another: where a mesh intersects itself
+/// everywhere, time would be cubic.
+const MOST_CERTIFIED: usize = 256;
 
 /// The checks that test pairs of triangles.
 const PAIRS: [Check; 2] = [Check::OneRing, Check::Nearby];
@@ -62,8 +69,15 @@ impl Embedding {
             self.certificates.prepare(v, mesh.ring(v).valence(), anew);
         }
         let mut intersecting = Vec::new();
-        for some in dirty.chunks(CHUNK) {
-            let pairs: usize = some.iter().map(|&v| self.check_vertex(mesh, v, &mut intersecting)).sum();
+        let mut left = dirty.iter();
+        while !left.as_slice().is_empty() {
+            let mut pairs = 0;
+            for &v in left.by_ref().take(CHUNK) {
+                pairs += self.check_vertex(mesh, v, &mut intersecting);
+                if pairs >= MANY_PAIRS {
+                    break;
+                }
+            }
             pauses.after(pairs / PAIRS_PER_UNIT).await;
         }
         dirty.iter().for_each(|v| self.pending[v.index()] = Checks::default());
@@ -146,7 +160,10 @@ impl Embedding {
                 let clearance = self.or_triangle_clearance(mesh, [v, w], self.nearby_clearance(mesh, [v, w]));
                 let until = self.record_clearance(mesh, [v, w], Check::Nearby, clearance, intersecting);
                 self.certify_nearby(v, k, until);
-                if let Some(position) = self.position_of(w, v) {
+                // Without it, the pair is tested once more at worst.
+                if self.near(w).len() <= MOST_CERTIFIED
+                    && let Some(position) = self.position_of(w, v)
+                {
                     self.certify_nearby(w, position, until);
                 }
             }

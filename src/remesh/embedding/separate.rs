@@ -3,6 +3,7 @@
 use super::Embedding;
 use crate::math::Vec3;
 use crate::mesh::{DisjointSets, Mesh, VertexId};
+use crate::pauses::Pauses;
 
 /// Displacements along the outward normals that are tried in turn to separate intersecting sheets, relative to the
 /// ordinary edge; negative ones are inwards.
@@ -18,6 +19,12 @@ const CLUSTER_DISTANCE: f32 = 1.0;
 /// moving a few vertices is no remedy.
 const MAX_VERTICES: usize = 4000;
 
+/// The largest number of pairs of vertices in all attempts for one cluster: an attempt tests all pairs, and a cluster of a
+/// hundred vertices gets all its thousand attempts.
+const MAX_PAIRS: usize = 20_000_000;
+/// The number of such pairs whose tests are a unit of work.
+const PAIRS_PER_UNIT: usize = 1000;
+
 /// Vertices to be moved, each with its displacement before scaling.
 type Moves = Vec<(VertexId, Vec3)>;
 
@@ -25,35 +32,48 @@ impl Embedding {
     /// Moves corners of intersecting triangles slightly until none intersect, one spatial cluster after the other; used
     /// for the start from a contour and for remeshing, after edits that were not fully tested. Returns whether none
     /// intersect afterwards; if some do, other clusters may have been changed. With more than 4000 corners, nothing is
-    /// tried.
+    /// tried. Pauses meanwhile.
     ///
     /// `intersecting` must contain all corners of intersecting triangles, as returned by
     /// [`Self::intersecting_vertices`].
-    pub fn separate(&mut self, mesh: &mut Mesh, intersecting: &[VertexId]) -> bool {
-        intersecting.len() <= MAX_VERTICES
-            && clusters(mesh, intersecting, CLUSTER_DISTANCE * self.ordinary_edge)
-                .iter()
-                .all(|cluster| self.separate_cluster(mesh, cluster))
+    pub async fn separate(&mut self, mesh: &mut Mesh, intersecting: &[VertexId], pauses: &Pauses) -> bool {
+        if intersecting.len() > MAX_VERTICES {
+            return false;
+        }
+        for cluster in clusters(mesh, intersecting, CLUSTER_DISTANCE * self.ordinary_edge) {
+            if !self.separate_cluster(mesh, &cluster, pauses).await {
+                return false;
+            }
+        }
+        true
     }
 
     /// Separates one cluster: tries to move all its vertices along their normals, then those of one sheet, then
     /// vertices towards the mean of their neighbours, which retracts a spike that pierces a sheet. Returns whether one
     /// of these succeeded.
-    fn separate_cluster(&mut self, mesh: &mut Mesh, cluster: &[VertexId]) -> bool {
+    async fn separate_cluster(&mut self, mesh: &mut Mesh, cluster: &[VertexId], pauses: &Pauses) -> bool {
         let normal = |v: VertexId| mesh.unit_normal(v) * self.ordinary_edge;
         let all: Moves = cluster.iter().map(|&v| (v, normal(v))).collect();
         let facing = |displacement: Vec3| -> Moves {
             all.iter().copied().filter(|(_, normal)| normal.dot(displacement) > 0.0).collect()
         };
-        let mut sheets = vec![all.clone()];
-        sheets.extend(all.iter().map(|&(_, displacement)| facing(displacement)));
+        let sheets = all.iter().map(|&(_, displacement)| facing(displacement));
+        let sheets = std::iter::once(all.clone()).chain(sheets);
         let inwards: Moves = cluster.iter().map(|&v| (v, to_neighbours(mesh, v))).collect();
-        let mut spikes: Vec<Moves> = vec![inwards.clone()];
-        spikes.extend(inwards.into_iter().map(|spike| vec![spike]));
-        let mut any_moves = |moves: &[Moves], shares: &[f32]| {
-            moves.iter().any(|moves| shares.iter().any(|&share| self.separates(mesh, cluster, moves, share)))
-        };
-        any_moves(&sheets, &OFFSETS) || any_moves(&spikes, &SHARES)
+        let spikes = std::iter::once(inwards.clone()).chain(inwards.iter().map(|&spike| vec![spike]));
+        let pairs = cluster.len() * cluster.len();
+        let mut attempts = MAX_PAIRS.div_ceil(pairs.max(1));
+        let offsets = sheets.map(|moves| (moves, OFFSETS.as_slice()));
+        for (moves, shares) in offsets.chain(spikes.map(|moves| (moves, SHARES.as_slice()))) {
+            for &share in &shares[..shares.len().min(attempts)] {
+                if self.separates(mesh, cluster, &moves, share) {
+                    return true;
+                }
+                pauses.after(pairs / PAIRS_PER_UNIT).await;
+            }
+            attempts = attempts.saturating_sub(shares.len());
+        }
+        false
     }
 
     /// Moves vertices of a cluster by `share` times their displacements, if no triangle of the cluster then intersects
@@ -99,6 +119,7 @@ mod tests {
     use super::*;
     use crate::math::Random;
     use crate::mesh::{count_self_intersections, shapes};
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -124,7 +145,7 @@ mod tests {
             let mut embedding = Embedding::default();
             embedding.sync_with_edge(&mesh, 0.9);
             let intersecting = embedding.intersecting_vertices(&mesh);
-            let separated = embedding.separate(&mut mesh, &intersecting);
+            let separated = finished(embedding.separate(&mut mesh, &intersecting, &Pauses::default()));
             count += u32::from(separated && !intersecting.is_empty());
             assert_eq!(separated, count_self_intersections(&mesh.to_triangles()) == 0, "seed {seed}");
             assert!(embedding.is_embedded(&mesh) == separated, "seed {seed}");
@@ -135,6 +156,23 @@ mod tests {
         assert!(count > 20, "{count} separated");
     }
 
+    /// Time would grow with the cube of the number of vertices.
+    #[test]
+    fn large_clusters_get_few_attempts() {
+        let mut mesh = Mesh::icosphere(Vec3::ZERO, 2.0, 0.2).unwrap();
+        let mut random = Random::new(1);
+        let mut shift = || random.unit() as f32;
+        mesh.positions_mut().iter_mut().for_each(|p| *p += Vec3::new(shift(), shift(), shift()));
+        let mut embedding = Embedding::default();
+        embedding.sync_with_edge(&mesh, 1.0);
+        let intersecting = embedding.intersecting_vertices(&mesh);
+        assert!(intersecting.len() > 500);
+        let pauses = Pauses::default();
+        assert!(!finished(embedding.separate(&mut mesh, &intersecting, &pauses)));
+        let most = (MAX_PAIRS + intersecting.len() * intersecting.len() * OFFSETS.len()) / PAIRS_PER_UNIT;
+        assert!((1..=most as u64).contains(&pauses.work()), "{}", pauses.work());
+    }
+
     #[test]
     fn balls_that_share_half_their_volume_are_left_to_others() {
         let mut mesh = Mesh::icosphere(Vec3::ZERO, 2.0, 0.8).unwrap();
@@ -142,7 +180,8 @@ mod tests {
         let mut embedding = Embedding::default();
         embedding.sync_with_edge(&mesh, 0.9);
         let intersecting = embedding.intersecting_vertices(&mesh);
-        assert!(!intersecting.is_empty() && !embedding.separate(&mut mesh, &intersecting));
+        let separated = finished(embedding.separate(&mut mesh, &intersecting, &Pauses::default()));
+        assert!(!intersecting.is_empty() && !separated);
         assert_eq!(mesh.check(), Ok(()));
     }
 }

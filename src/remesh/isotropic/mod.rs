@@ -117,7 +117,7 @@ async fn remesh_scaled(mesh: &mut Mesh, bounds: EdgeBounds, pauses: &Pauses) -> 
         let mut changes = rounds(mesh, bounds, &mut session, pauses).await;
         let mut embedding = embedding_of(mesh, bounds.max);
         let intersecting = embedding.intersecting_vertices_in_slices(mesh, pauses).await;
-        let is_separated = intersecting.is_empty() || embedding.separate(mesh, &intersecting);
+        let is_separated = intersecting.is_empty() || embedding.separate(mesh, &intersecting, pauses).await;
         let has_left_out = !conflicts.is_empty();
         pauses.now().await;
         let near = if is_separated {
