@@ -13,7 +13,12 @@ function bumpy(): Mesh {
 }
 
 const EDGE = { min: 0.04, max: 0.12 };
-const GRID = new Volume({ data: new Uint8Array(30 ** 3), dims: [30, 30, 30], spacing: [0.1, 0.1, 0.1], origin: [-1.5, -1.5, -1.5] });
+const GRID = new Volume({
+  data: new Uint8Array(30 ** 3),
+  dims: [30, 30, 30],
+  spacing: [0.1, 0.1, 0.1],
+  origin: [-1.5, -1.5, -1.5],
+});
 const OTHER = Mesh.icosphere([0.1, 0, 0], 1, 0.1);
 
 /** Each operation, which both kinds of objects have. */
