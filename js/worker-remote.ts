@@ -1,4 +1,5 @@
 // The page's proxies of the objects in the worker.
+import { onAbort } from './abort.js';
 import { checkProperties, invalid } from './check.js';
 import { type CoverageOptions, checkedCoverage } from './coverage.js';
 import { VesicleError } from './error.js';
@@ -221,8 +222,7 @@ async function abortable(
   const call = { on: target, name, args: sent.args, reports: !!listener };
   const task: Task = { type: 'call', ...call, ...(slices && { slices }) };
   const { id, answer } = session.post(task, { ...sent, target: on, onReport });
-  const abort = () => stop.abort(signal?.reason);
-  signal?.addEventListener('abort', abort);
+  const forget = onAbort(signal, () => stop.abort(signal?.reason));
   stop.signal.addEventListener('abort', () => session.abort(id));
   try {
     // An object that is not needed any more is freed with its proxy.
@@ -233,7 +233,7 @@ async function abortable(
     // Rejects with the abort reason, but with the worker's failure if it has ended.
     throw stop.signal.aborted && !session.ended ? stop.signal.reason : error;
   } finally {
-    signal?.removeEventListener('abort', abort);
+    forget();
   }
 }
 

@@ -46,8 +46,8 @@ class Reader {
   }
 }
 
-/** Throws `bad-file` unless a stream has triangles, and not more than its bytes can hold. */
-export function checkDracoHeader(bytes: Uint8Array, field: string): void {
+/** Returns the number of triangles of a stream; throws `bad-file` unless it has any, and not more than its bytes can hold. */
+export function dracoTriangles(bytes: Uint8Array, field: string): number {
   if (new TextDecoder('latin1').decode(bytes.subarray(0, 5)) !== 'DRACO') throw badGltf(field, 'is no Draco stream');
   const reader = new Reader(bytes, 5, field);
   const version = 256 * reader.byte() + reader.byte();
@@ -64,6 +64,7 @@ export function checkDracoHeader(bytes: Uint8Array, field: string): void {
   const faces = facesOf(reader, version, isEdgebreaker);
   if (faces > bytes.length * MOST_PER_BYTE)
     throw badGltf(field, `the Draco stream states ${faces} triangles in ${bytes.length} bytes`);
+  return faces;
 }
 
 /** Returns the number of triangles, which older versions precede by more, or write as four bytes. */

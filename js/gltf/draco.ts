@@ -1,7 +1,7 @@
 // KHR_draco_mesh_compression: all vertices and triangles of a primitive are one stream.
 import { type DecoderSource, startedModule } from '../decoder-source.js';
 import type { Budget } from './budget.js';
-import { checkDracoHeader } from './draco-header.js';
+import { dracoTriangles } from './draco-header.js';
 import { badGltf, reasonOf } from './error.js';
 import { entry, type Json, list, object, whole } from './json.js';
 
@@ -89,7 +89,8 @@ export function decodePrimitive(
 ): void {
   const mode = whole(primitive.mode, `${field}.mode`, 4);
   if (mode !== 4 && mode !== 5) throw badGltf(`${field}.mode`, `must be 4 or 5 with ${DRACO}, got ${mode}`);
-  checkDracoHeader(stream, field);
+  // Before they are decoded.
+  target.budget(12 * dracoTriangles(stream, field), `${field}.indices`);
   const decoder = new draco.Decoder();
   const mesh = new draco.Mesh();
   try {
@@ -136,6 +137,7 @@ class Decoded {
       this.#checkCount(accessor, count, field);
       // Elements start at multiples of four bytes.
       const [tight, stride] = [width * size, Math.ceil((width * size) / 4) * 4];
+      this.target.budget(count * tight, field);
       const bytes = this.#copied(count * tight, field, (length, to) =>
         this.decoder.GetAttributeDataArrayForAllPoints(this.mesh, attribute, type, length, to),
       );
@@ -176,7 +178,6 @@ class Decoded {
   }
 
   #copied(length: number, field: string, write: (length: number, to: number) => boolean): Uint8Array {
-    this.target.budget(length, field);
     const to = this.draco._malloc(length);
     try {
       if (!to || !write(length, to)) throw badGltf(field, 'the Draco stream cannot be read as the accessor says');

@@ -9,8 +9,12 @@ export function badGltf(field: string, problem: string): VesicleError {
 }
 
 /** Returns the `too-large` error for data that would decode to that number of bytes. */
-export function tooLarge(field: string, bytes: number): VesicleError {
-  return new VesicleError('too-large', `glTF: ${shortened(field)}: needs ${bytes} bytes, far more than its file`);
+export function tooLarge(field: string, bytes: number, limit?: number): VesicleError {
+  const most = limit === undefined ? '' : `; files of this size may decode to ${limit}`;
+  return new VesicleError(
+    'too-large',
+    `glTF: ${shortened(field)}: needs ${bytes} bytes, far more than its file${most}`,
+  );
 }
 
 /** Returns what an error of another library says. */

@@ -9,7 +9,7 @@ import type { NamedFile } from '../data.js';
 import type { DecoderSource } from '../decoder-source.js';
 import { VesicleError } from '../error.js';
 import { checkedNamedFiles } from '../input-file.js';
-import { budgetOf } from './budget.js';
+import { budgetOf, checkRepeated } from './budget.js';
 import { type Buffers, buffersOf, packed, parsed, partsOf, rangeOf } from './container.js';
 import { type MeshDecoders, started } from './decoders.js';
 import { DRACO, decodePrimitive, dracoInstance, dracoOf, type Target } from './draco.js';
@@ -65,7 +65,8 @@ async function decompressed(bytes: Uint8Array, files: NamedFile[], decoders: Mes
   if (!parts) throw new VesicleError('bad-file', 'glTF: is damaged');
   const root = parsed(parts);
   const buffers = buffersOf(root, parts, files);
-  const budget = budgetOf(files.reduce((sum, { bytes }) => sum + bytes.length, bytes.length));
+  const fileBytes = files.reduce((sum, { bytes }) => sum + bytes.length, bytes.length);
+  const budget = budgetOf(fileBytes);
   const contents = await viewsOf({ root, buffers, budget }, decoders);
   const add = (view: Uint8Array) => {
     contents.push(view);
@@ -73,6 +74,7 @@ async function decompressed(bytes: Uint8Array, files: NamedFile[], decoders: Mes
   };
   await decodePrimitives({ root, budget, add }, contents, decoders);
   forget(root);
+  checkRepeated(root, fileBytes);
   return packed(root, withoutUnused(root, contents));
 }
 

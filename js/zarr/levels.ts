@@ -140,7 +140,8 @@ export class Level {
 
   /** Returns a chunk; undefined if it is not stored. */
   async #chunk(position: number[], part: string, signal: AbortSignal): Promise<Stored | undefined> {
-    const options: FileOptions = { signal, mostBytes: withSlack(this.#chunkBytes), mustExist: true };
+    const decodesTo = this.#chunkBytes;
+    const options: FileOptions = { signal, mostBytes: withSlack(decodesTo), decodesTo, mustExist: true };
     for (;;) {
       try {
         const chunk = (await this.#array.getChunk(position, options)) as unknown as Stored;

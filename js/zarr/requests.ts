@@ -1,7 +1,8 @@
 // Requests to a store: a bounded number at a time, with a time limit, repeated where that can help.
 import type { AsyncReadable, GetOptions, RangeQuery, Readable } from '@zarrita/storage';
+import { onAbort } from '../abort.js';
 import { VesicleError } from '../error.js';
-import { badZarr, RefusedError } from './error.js';
+import { badZarr, RefusedError, tooLarge } from './error.js';
 
 /** Duration of the pause before the first repetition, milliseconds; each later one is twice as long. */
 const FIRST_PAUSE_MS = 250;
@@ -42,10 +43,18 @@ const MOST_METADATA = 2 ** 22;
 /** Most brackets within brackets in metadata; images have a dozen. */
 const MOST_NESTED = 200;
 
+/**
+ * Stored bytes of chunks that are small, and the most bytes that these may decode to: a constant chunk of 256 × 256 × 256
+ * floats. Decoders and what comes after them take up to four times the bytes of a chunk.
+ */
+const [SMALL_CHUNK, MOST_OF_SMALL_CHUNK] = [2 ** 17, 2 ** 26];
+
 /** How a file is asked for. Stores get the same, and heed what they know. */
 export interface FileOptions extends GetOptions {
   /** Most bytes of the file; that of metadata by default. */
   mostBytes?: number;
+  /** Bytes that the file, or the part of it, decodes to if it is what the metadata say. */
+  decodesTo?: number;
   /** Reject with {@link NotStored} if there is no such file. */
   mustExist?: boolean;
 }
@@ -56,6 +65,16 @@ export class NotStored extends Error {}
 /** Throws `bad-file` for a file of more bytes than are read of it. */
 export function checkLength(key: string, length: number, most: number): void {
   if (length > most) throw badZarr(key, `larger than the ${Math.floor(most)} bytes that it may have`);
+}
+
+/** Throws `too-large` for few bytes that decode to very many. */
+function checkDecoded(key: string, stored: number, decoded: number): void {
+  if (stored > SMALL_CHUNK || decoded <= MOST_OF_SMALL_CHUNK) return;
+  throw tooLarge(
+    key,
+    `${stored} bytes would decode to ${decoded}; chunks that are stored in up to ${SMALL_CHUNK / 2 ** 10} KiB may ` +
+      `decode to ${MOST_OF_SMALL_CHUNK / 2 ** 20} MiB: store the image in smaller chunks`,
+  );
 }
 
 /** A store that makes its requests to another one. */
@@ -99,7 +118,9 @@ export class Requests implements AsyncReadable {
     const length = 'length' in range ? range.length : range.suffixLength;
     if (given.mostBytes !== undefined) checkLength(key, length, given.mostBytes);
     const send = async (signal: AbortSignal) => this.#store.getRange?.(key, range, { signal });
-    const bytes = await this.#existing(key, given, send);
+    // The index of a shard is counted from its end.
+    const { decodesTo = 0 } = 'length' in range ? given : {};
+    const bytes = await this.#existing(key, { ...given, decodesTo }, send);
     if (bytes === undefined || bytes.length === length) return bytes;
     throw badZarr(key, `truncated: ${bytes.length} of ${length} bytes`);
   }
@@ -107,10 +128,11 @@ export class Requests implements AsyncReadable {
   /** Makes a request for a file, unless it must exist and is known not to. */
   async #existing(
     key: Key,
-    { mustExist, signal }: FileOptions,
+    { mustExist, decodesTo = 0, signal }: FileOptions,
     send: (signal: AbortSignal) => Promise<Uint8Array | undefined>,
   ): Promise<Uint8Array | undefined> {
     const bytes = this.#missing.has(key) ? undefined : await this.#run(key, send, signal);
+    if (bytes !== undefined) checkDecoded(key, bytes.length, decodesTo);
     if (bytes !== undefined || !mustExist) return bytes;
     this.#missing.add(key);
     throw new NotStored();
@@ -190,9 +212,8 @@ async function limited<T>(
   signal: AbortSignal | undefined,
 ): Promise<T> {
   const stop = new AbortController();
-  const abort = () => stop.abort(signal?.reason);
   const stalled = () => stop.abort(new Error(`no answer within ${timeoutMs / 1000} s`));
-  signal?.addEventListener('abort', abort);
+  const forget = onAbort(signal, () => stop.abort(signal?.reason));
   const timer = Number.isFinite(timeoutMs) ? setTimeout(stalled, timeoutMs) : undefined;
   try {
     signal?.throwIfAborted();
@@ -200,7 +221,7 @@ async function limited<T>(
     return await untilAborted(send(stop.signal), stop.signal);
   } finally {
     clearTimeout(timer);
-    signal?.removeEventListener('abort', abort);
+    forget();
   }
 }
 
@@ -210,8 +231,7 @@ export function untilAborted<T>(promise: Promise<T>, signal: AbortSignal | undef
   return new Promise((resolve, reject) => {
     const abort = () => reject(signal.reason);
     if (signal.aborted) abort();
-    signal.addEventListener('abort', abort);
-    promise.then(resolve, reject).finally(() => signal.removeEventListener('abort', abort));
+    promise.then(resolve, reject).finally(onAbort(signal, abort));
   });
 }
 

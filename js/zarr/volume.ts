@@ -145,7 +145,7 @@ export class ZarrVolume {
     if (this.#unread) return;
     const { data } = await this.voxels(index, { min: [0, 0, 0], max: level.info.dims }, signal && { signal });
     this.#coarsest = data;
-    this.#range = rangeOf(data);
+    this.#range = await rangeOf(data, signal);
   }
 
   /** @internal */
@@ -308,12 +308,20 @@ function whyUnread({ bytes, chunkCount, decodedBytes }: Level): string {
   return `the chunks of the coarsest level must not be larger than 2 GB, got ${Math.ceil(decodedBytes / 1e6)} MB`;
 }
 
-function rangeOf(data: VoxelArray): [number, number] | undefined {
-  let [low, high] = [Infinity, -Infinity];
-  for (const value of data) {
-    if (!Number.isFinite(value)) continue;
-    if (value < low) low = value;
-    if (value > high) high = value;
-  }
-  return low <= high ? [low, high] : undefined;
+/** Number of voxels that are looked through without a pause. */
+const SLICE = 2 ** 20;
+
+function rangeOf(data: VoxelArray, signal: AbortSignal | undefined): Promise<[number, number] | undefined> {
+  return withPause(signal, async (pause) => {
+    let [low, high] = [Infinity, -Infinity];
+    for (let start = 0; start < data.length; start += SLICE) {
+      for (let i = start; i < Math.min(data.length, start + SLICE); i++) {
+        const value = data[i] as number;
+        if (value < low && value !== -Infinity) low = value;
+        if (value > high && value !== Infinity) high = value;
+      }
+      await pause.turn();
+    }
+    return low <= high ? [low, high] : undefined;
+  });
 }

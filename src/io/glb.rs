@@ -23,7 +23,7 @@ const JSON_LIMIT: usize = 1 << 26;
 pub(super) fn parse(bytes: &[u8], files: &[(&str, &[u8])]) -> Result<MeshFile, FormatError> {
     let (json, binary) = chunks(bytes)?;
     let root = document(json, "JSON chunk")?;
-    gltf::triangles(&root, &Buffers::new(&root, Some(binary), files))
+    gltf::triangles(&root, &Buffers::new(&root, Some(binary), files), json.len())
 }
 
 /// Returns whether the bytes may be a glTF document as text: whether they are a JSON object.
@@ -39,7 +39,7 @@ pub(super) fn parse_text(bytes: &[u8], files: &[(&str, &[u8])]) -> Result<MeshFi
         if !version.starts_with("2.") {
             return Err(FormatError::unsupported(TEXT_FORMAT, "asset", version, "2.0"));
         }
-        gltf::triangles(&root, &Buffers::new(&root, None, files))
+        gltf::triangles(&root, &Buffers::new(&root, None, files), bytes.len())
     };
     read().map_err(|error| error.of_format(TEXT_FORMAT))
 }

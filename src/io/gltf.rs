@@ -39,15 +39,15 @@ const SUPPORTED: [&str; 11] = [
 /// Returns all triangles of the default scene of a glTF document as one mesh, transformed to world space by their
 /// nodes, morphed by their default weights, and posed by their skins; in the space that the root states, if it does. Normals, texture coordinates and colours are read
 /// if every triangle primitive has them. If texture coordinates are, the first base colour texture is read, too, provided
-/// that its image is in the document or a file beside it.
-pub(super) fn triangles(root: &Value, buffers: &Buffers) -> Result<MeshFile, FormatError> {
+/// that its image is in the document or a file beside it. `text` is the number of bytes of the document without its buffers.
+pub(super) fn triangles(root: &Value, buffers: &Buffers, text: usize) -> Result<MeshFile, FormatError> {
     let document = Document { root, buffers };
     document.check_extensions()?;
     let parts = document.parts()?;
     if parts.is_empty() {
         return Err(FormatError::invalid(FORMAT, "meshes", "the scene has no triangles"));
     }
-    let (mut mesh, mut positions) = Size::of(&parts).allocate(buffers.size)?;
+    let (mut mesh, mut positions) = Size::of(&parts).allocate(buffers.size, text as u64)?;
     for part in &parts {
         append(&mut mesh, part.read(&mut positions)?, positions.len());
     }
@@ -85,9 +85,14 @@ fn extend<T>(all: &mut Option<Vec<T>>, part: Option<Vec<T>>) {
     }
 }
 
-/// Largest number of bytes of a mesh whose file is small: nodes may repeat a mesh, so that a small file may stand for any
-/// number of triangles.
+/// Largest number of bytes of a mesh whose file is not large: nodes may repeat a mesh, so that a file may stand for any number
+/// of triangles.
 const REPEATED_LIMIT: u64 = 1 << 27;
+
+/// Number of bytes of files that are small, and largest number of bytes of their meshes: of the half million triangles, a
+/// method may make several times as many.
+const SMALL: u64 = 1 << 17;
+const REPEATED_LIMIT_OF_SMALL: u64 = 1 << 23;
 
 /// Number of bytes of a mesh for each byte of its file that may always be read: no file without repetition needs more.
 const GROWTH: u64 = 12;
@@ -112,16 +117,22 @@ impl Size {
         size
     }
 
-    /// Returns a mesh without elements and positions, with memory for all of the scene, whose file has `file` bytes.
+    /// Returns a mesh without elements and positions, with memory for all of the scene, whose file has buffers of `buffers`
+    /// bytes, and `text` others.
     ///
     /// # Errors
     /// [`FormatError::TooLarge`] for a scene that is far larger than its file, or does not fit in memory.
-    fn allocate(&self, file: u64) -> Result<(TriangleMesh, WorldPositions), FormatError> {
+    fn allocate(&self, buffers: u64, text: u64) -> Result<(TriangleMesh, WorldPositions), FormatError> {
         let [normals, uvs, colors] = self.attributes;
         let vertex = 12 + 12 * u64::from(normals) + 8 * u64::from(uvs) + 12 * u64::from(colors);
         let bytes = self.vertices.saturating_mul(vertex).saturating_add(self.triangles.saturating_mul(12));
         let too_large = || FormatError::too_large(FORMAT, "nodes", bytes);
-        if bytes > REPEATED_LIMIT.max(file.saturating_mul(GROWTH)) {
+        let is_small = buffers.saturating_add(text) <= SMALL;
+        if is_small && bytes > REPEATED_LIMIT_OF_SMALL {
+            let field = "nodes: of a file of up to 128 KiB, they may repeat meshes up to 8 MiB";
+            return Err(FormatError::too_large(FORMAT, field, bytes));
+        }
+        if bytes > REPEATED_LIMIT.max(buffers.saturating_mul(GROWTH)) {
             return Err(too_large());
         }
         let vertices = self.vertices as usize;

@@ -31,6 +31,7 @@ mod ply;
 mod point_text;
 mod points;
 mod raw;
+mod small;
 mod source;
 mod stl;
 mod text;

@@ -50,7 +50,10 @@ class NameOpening extends Opening<Example, Linked, string, string> {
   protected find = (id: string) => ({ id });
   protected linkedBy = () => undefined;
   protected fromExample = (example: Example) => ({ name: example.id, load: async () => example.id, example });
-  protected fromFiles = ([file]: File[]) => ({ name: file?.name ?? '', load: async () => file?.name ?? '' });
+  protected fromFiles = ([file]: File[]) => {
+    const name = file?.name ?? '';
+    return { name, load: () => (name === 'slow' ? new Promise<string>(() => undefined) : Promise.resolve(name)) };
+  };
   protected load = async (_: AnySource, data: string) => data;
   protected async adopt(opened: string, source: AnySource): Promise<void> {
     this.#page.states.ready = true;
@@ -93,4 +96,19 @@ test('after a session that cannot be shown in a lab with nothing open, the first
   await opening.session(named('bad', 'other'), []);
   expect(page.shown).toBe('first');
   expect(page.message).toContain('bad could not be opened');
+});
+
+test('the first data can be cancelled from the beginning, unless there is nothing else to open', async () => {
+  const page = new Page();
+  const offers: boolean[] = [];
+  page.states.subscribeCancellable((isCancellable) => offers.push(isCancellable));
+  const opening = new NameOpening(page);
+  const first = opening.default();
+  expect(offers).toEqual([false]);
+  void opening.files([new File([], 'slow')]);
+  expect(offers).toEqual([false, true]);
+  await opening.cancel();
+  await first;
+  expect(page).toMatchObject({ shown: 'first', restarts: 1 });
+  expect(offers).toEqual([false, true, false]);
 });

@@ -5,7 +5,7 @@ import type { Page } from 'playwright-core';
 import { strFromU8, strToU8, unzipSync, type Zippable, zipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import { at } from '../../scripts/shell.mjs';
-import { type App, afterRun, drop, LABS, open, openApp, QUICK, reach } from './browser';
+import { type App, afterRun, anotherPage, drop, LABS, open, openApp, QUICK, reach } from './browser';
 
 let app: App;
 /** A session of the Extract lab with its data. */
@@ -100,4 +100,25 @@ test.each(LABS)('%s: its own session opens, and with a camera nowhere it is refu
   await dropSession(page, session);
   await page.waitForSelector('.banner[hidden]', { state: 'attached' });
   await reach(page, 'paused', 'done');
+});
+
+test('a session is read in a worker, which refuses it in the language of the page', async () => {
+  const page = await anotherPage(app, () => {
+    const { parse } = JSON;
+    JSON.parse = (text, ...more) => {
+      if (text.length > 1e5) document.body.dataset.parsed = 'on the page';
+      return parse(text, ...more);
+    };
+  });
+  await page.goto(`${app.address}?lang=de#${QUICK.extract}`);
+  await reach(page, 'done');
+  await dropSession(
+    page,
+    withIndex(tooth, (index) => {
+      index.hash = 'x'.repeat(2 ** 21);
+    }),
+  );
+  await banner(page).toContain('Ihre session.json ist beschädigt: hash ist zu lang');
+  expect(await page.getAttribute('body', 'data-parsed')).toBeNull();
+  await page.close();
 });

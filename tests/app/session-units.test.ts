@@ -82,10 +82,34 @@ test('a session keeps warnings, and calls without arguments in its log', async (
 });
 
 test('a huge session.json is not read', async () => {
+  const large = new Uint8Array(2 ** 17 + 1);
   for (const index of [new Uint8Array(2 ** 27 + 1), strToU8(`{"x":[0${',[]'.repeat(5e6)}]}`)])
-    await expect(readSession(Uint8Array.of(), () => ({ 'session.json': index }))).rejects.toThrow(
-      'more than 128 MiB or 5',
-    );
+    await expect(readSession(large, () => ({ 'session.json': index }))).rejects.toThrow('more than 128 MiB or 5');
+  const index = new Uint8Array(2 ** 23 + 1);
+  await expect(readSession(large.slice(1), () => ({ 'session.json': index }))).rejects.toThrow('more than 8 MiB or 5');
+  await expect(readSession(large, () => ({ 'session.json': index }))).rejects.toThrow('damaged');
+});
+
+test('one that repeats itself can be read again, however well it packs', async () => {
+  const written = await session();
+  const calls = Array.from({ length: 20_000 }, () => ({
+    call: 'setParams',
+    given: { iso: 1, note: 'n'.repeat(190), other: 'n'.repeat(200) },
+  }));
+  const log = { setup: { start: { kind: 'contour' }, levels: 1, params: {}, attractors: [] }, calls };
+  const bytes = await writeSession({ ...written, content: { ...written.content, model: { ...MOMENT.model, log } } });
+  const { content } = await readSession(bytes);
+  expect(content).toMatchObject({ model: { log: { calls: { length: 20_000 } } } });
+});
+
+test('a session that the page takes up at once is refused if it has more than labs have', async () => {
+  const warnings = Array.from({ length: 2001 }, (_, index) => ({ code: 'reader', text: String(index) }));
+  const attractors = Array.from({ length: 501 }, () => ({ point: [0, 0, 0], strength: 1, radius: 1 }));
+  const page = { ...MOMENT.page, attractors };
+  for (const [field, value] of Object.entries({ warnings, 'page.attractors': page })) {
+    const bytes = await withIndex((index) => Object.assign(index, { [field.split('.')[0] as string]: value }));
+    await expect(readSession(bytes)).rejects.toThrow(`${field} is too long`);
+  }
 });
 
 test('long names are cut', async () => {

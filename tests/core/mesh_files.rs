@@ -407,6 +407,22 @@ fn a_mesh_instanced_too_often_is_refused() {
 }
 
 #[test]
+fn a_small_file_repeats_a_mesh_to_8_mib() {
+    let parsed = |nodes: usize, padding: usize| {
+        let many = r#"{"mode":4,"attributes":{"POSITION":0},"indices":1},"#.repeat(1000);
+        let nodes = vec![r#"{"mesh":0}"#; nodes].join(",");
+        let json = strip_document(&nodes).replace(r#""primitives":["#, &format!(r#""primitives":[{many}"#));
+        let extras = format!(r#"{{"extras":"{}","asset""#, " ".repeat(padding));
+        parse_mesh(&glb(&json.replacen(r#"{"asset""#, &extras, 1), &STRIP)).map(|file| file.triangles.len())
+    };
+    // Each node has 1001 parts of 72 bytes, but for the last, which is a strip.
+    assert!(parsed(110, 0).is_ok());
+    let error = parsed(125, 0).unwrap_err().to_string();
+    assert!(error.contains("128 KiB, they may repeat meshes up to 8 MiB: needs"), "{error}");
+    assert!(parsed(125, 1 << 17).is_ok());
+}
+
+#[test]
 fn bytes_that_are_no_mesh_are_refused() {
     for (bytes, message) in [
         (&b""[..], "mesh file: content"),

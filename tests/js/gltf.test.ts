@@ -168,6 +168,35 @@ test('what states far more than it has takes neither time nor memory', async () 
   expect(large.code).toBe('too-large');
 });
 
+test('a small file does not decode to very much, nor do its nodes repeat that', async () => {
+  const states = dracoStream(BALL, { sequential: true });
+  const padded = new Uint8Array(30_000);
+  padded.set(states.bytes);
+  // 1.4 million triangles: fewer than 64 for each byte.
+  padded.set([0xd0, 0xf6, 0x55, 0], 11);
+  const error = await rejection(decompressGltf(dracoGlb([{ ...states, bytes: padded }])));
+  expect([error.code, error.message]).toEqual([
+    'too-large',
+    expect.stringMatching(/indices: needs \d+ .* decode to 16777216/),
+  ]);
+  const repeated = (bytes: Uint8Array) => (more: object[], count: number) => {
+    const json = jsonOf(bytes);
+    json.nodes = [...Array.from({ length: count }, () => ({ mesh: 0 })), ...more];
+    json.scenes = [{ nodes: json.nodes.map((_: object, k: number) => k) }];
+    return decompressGltf(glb(json, bytes.slice(bytes.length - json.buffers[0].byteLength)));
+  };
+  const instances = { mesh: 0, extensions: { EXT_mesh_gpu_instancing: { attributes: { TRANSLATION: 0 } } } };
+  const vertices = BALL.positions.length / 3;
+  const each = 12 * vertices + 4 * BALL.indices.length;
+  for (const bytes of [dracoGlb([STREAM]), await meshoptGlb(BALL)]) {
+    const most = Math.floor(2 ** 24 / each);
+    expect((await repeated(bytes)([], most)).length).toBeGreaterThan(0);
+    expect((await rejection(repeated(bytes)([], most + 1))).message).toMatch(/nodes: needs \d+ bytes/);
+    const rejected = await rejection(repeated(bytes)(Array(Math.ceil(most / vertices)).fill(instances), 1));
+    expect(rejected.message).toMatch(/nodes: needs \d+ bytes/);
+  }
+});
+
 test('overlapping buffer views do not multiply a file', async () => {
   const view = { buffer: 0, byteLength: STREAM.bytes.length };
   const many = patched((json) => {

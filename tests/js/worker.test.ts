@@ -1,5 +1,6 @@
 // The package in a worker, in Node: the same results as without, and features of its own.
 import { execFileSync } from 'node:child_process';
+import { getEventListeners } from 'node:events';
 import { readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { Worker as NodeWorker } from 'node:worker_threads';
@@ -655,4 +656,14 @@ test('unreachable objects are freed in the worker, those in use are not', () => 
     while (freed.size < 23) { gc(); await new Promise((resolve) => setTimeout(resolve)); }
     console.log(freed.size, (await mesh.info()).components > 0);`;
   expect(node(script, '--expose-gc').split('\n')).toEqual(['true true 0', '23 true']);
+});
+
+test('many calls with one signal have one listener, and all are aborted', async () => {
+  const stop = new AbortController();
+  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 4);
+  const slices = mesh.inSlices({ signal: stop.signal, budgetMs: 1e-6 });
+  const calls = Array.from({ length: 12 }, () => slices.distanceTo(mesh).catch((reason: unknown) => reason));
+  expect(getEventListeners(stop.signal, 'abort')).toHaveLength(1);
+  stop.abort('enough');
+  expect(await Promise.all(calls)).toEqual(calls.map(() => 'enough'));
 });

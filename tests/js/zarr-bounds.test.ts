@@ -54,21 +54,23 @@ const CUBE = { shape: [8, 8, 8], chunks: [8, 8, 8] };
 const gzip = { name: 'gzip', configuration: { level: 9 } };
 const zeros = (count: number) => new Uint8Array(count);
 
-/** A frame of Zstandard without a size: blocks that repeat a byte, 131,071 times each. */
-function zstdRuns(blocks: number): Uint8Array {
-  const bytes = [0x28, 0xb5, 0x2f, 0xfd, 0, 0x58];
-  for (let i = 1; i <= blocks; i++) {
-    const header = (i === blocks ? 1 : 0) + (1 << 1) + (0x1ffff << 3);
+/** Blocks of Zstandard that repeat a byte, at most 131,071 times each. */
+function zstdBlocks(size: number): number[] {
+  const bytes: number[] = [];
+  for (let left = size; left > 0; left -= 0x1ffff) {
+    const header = (left <= 0x1ffff ? 1 : 0) + (1 << 1) + (Math.min(left, 0x1ffff) << 3);
     bytes.push(header & 255, (header >> 8) & 255, header >> 16, 7);
   }
-  return Uint8Array.from(bytes);
+  return bytes;
 }
 
+/** A frame of Zstandard without a size. */
+const zstdRuns = (blocks: number) =>
+  Uint8Array.from([0x28, 0xb5, 0x2f, 0xfd, 0, 0x58, ...zstdBlocks(blocks * 0x1ffff)]);
+
 /** The same with a size. */
-function zstdSized(size: number): Uint8Array {
-  const blocks = zstdRuns(Math.ceil(size / 0x1ffff)).subarray(6);
-  return Uint8Array.from([0x28, 0xb5, 0x2f, 0xfd, 0b1010_0000, ...u32(size), ...blocks]);
-}
+const zstdSized = (size: number) =>
+  Uint8Array.from([0x28, 0xb5, 0x2f, 0xfd, 0b1010_0000, ...u32(size), ...zstdBlocks(size)]);
 
 /** A header that states how many bytes follow once they are decoded. */
 const bloscOf = (bytes: number) => Uint8Array.from([2, 1, 1, 1, ...u32(bytes), ...u32(bytes), ...u32(32), 0, 0, 0, 0]);
@@ -102,6 +104,46 @@ describe('decoders stop at the size of a chunk', () => {
     const array = await zarrita.open.v3(zarrita.root(store).resolve('0'), { kind: 'array' });
     expect((await array.getChunk([0, 0, 0])).data).toEqual(voxels);
   });
+});
+
+describe('a chunk of few bytes', () => {
+  const zstd = { name: 'zstd', configuration: { level: 5, checksum: false } };
+  const constant = (size: number) =>
+    withChunk({ shape: [1, size, 1024], chunks: [1, size, 1024], codecs: [zstd] }, zstdSized(size * 1024));
+
+  test('that decodes to hundreds of megabytes is refused before it is decoded', async () => {
+    const grown = await growth(async () => {
+      const { code, message } = await rejection(openZarr(constant(244_140)));
+      expect([code, message]).toEqual([
+        'too-large',
+        expect.stringMatching(/7\d+ bytes would decode to 249999360; .* 64 MiB: store/),
+      ]);
+    });
+    expect(grown).toBeLessThan(60e6);
+  });
+
+  test('is read up to the limit', async () => {
+    expect((await openZarr(constant(2 ** 16))).range).toEqual([7, 7]);
+    expect((await rejection(openZarr(constant(2 ** 16 + 1)))).code).toBe('too-large');
+  });
+
+  test('of which an image has many', async () => {
+    const given = { shape: [1, 240_000, 1024], chunks: [1, 20_000, 1024], codecs: [zstd] };
+    const files = image(given);
+    for (let y = 0; y < 12; y++) files.set(`/0/c/0/${y}/0`, zstdSized(20_000 * 1024));
+    expect((await openZarr(new TestStore(files))).range).toEqual([7, 7]);
+  });
+});
+
+test('the range of a coarsest level of few values', async () => {
+  const rangeOf = async (values: number[]) => {
+    const bytes = new Uint8Array(Float32Array.from(values).buffer);
+    const size = [1, 1, values.length];
+    return (await openZarr(withChunk({ shape: size, chunks: size, type: 'float32' }, bytes))).range;
+  };
+  expect(await rangeOf([Number.NaN, Infinity, 3, -Infinity])).toEqual([3, 3]);
+  expect(await rangeOf([-Infinity, -2, 5, Number.NaN])).toEqual([-2, 5]);
+  expect(await rangeOf([Number.NaN, Infinity])).toBeUndefined();
 });
 
 describe('an image whose metadata promise much', () => {

@@ -395,6 +395,20 @@ describe('chunks', () => {
 });
 
 describe('an abort', () => {
+  test('is listened for once, however many requests there are: Node warns of eleven listeners', async () => {
+    const warnings: string[] = [];
+    const note = ({ name }: Error) => warnings.push(name);
+    process.on('warning', note);
+    const store = await storeOf('v3-zstd-zyx');
+    // All chunks at a time, and 30 of them wait.
+    store.fault = async (_, bytes) => new Promise((resolve) => setTimeout(() => resolve(bytes), 1));
+    await voxels(await openZarr(store, { concurrency: 12 }));
+    await new Promise((resolve) => setTimeout(resolve));
+    process.off('warning', note);
+    expect(store.most).toBeGreaterThan(10);
+    expect(warnings).toEqual([]);
+  });
+
   /** Aborts when the request of a number begins; opens an image, and reads all of it. */
   async function abortedAt(image: string, number: number): Promise<[unknown, unknown, TestStore]> {
     const store = await storeOf(image);

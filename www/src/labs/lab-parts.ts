@@ -202,9 +202,13 @@ export abstract class LabParts<Example extends Listed> {
     return section(text('labs.sectionSave'), ...elements, this.session.element, pictures.element, this.#link);
   }
 
-  /** Shows the button that cancels loading; returns whether nothing is being loaded. */
+  /** Shows the button that cancels what the lab is busy with, or hides it. */
+  offerCancel(isOffered: boolean): void {
+    this.cancel.hidden = !isOffered;
+  }
+
+  /** Shows the lab's state; returns whether nothing is being loaded. */
   protected showLoading(state: LabState, ready: boolean): boolean {
-    this.cancel.hidden = state !== 'loading' || !ready;
     this.#pictures?.showState(state);
     const idle = ready && state !== 'loading';
     this.session.enabled = idle;

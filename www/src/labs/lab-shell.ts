@@ -107,6 +107,7 @@ export abstract class LabShell<Example extends Listed> implements Lab {
     });
     this.opening.onReplaced = () => this.work.settled();
     this.states.subscribe((state) => this.#showState(state));
+    this.states.subscribeCancellable((isCancellable) => this.ui.offerCancel(isCancellable));
     // Until a change is in force, the state and the measures are those of the run before it.
     this.states.subscribeChanging((isChanging) => this.root.toggleAttribute('data-changing', isChanging));
     const onEscape = {

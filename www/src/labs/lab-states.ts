@@ -19,6 +19,9 @@ export class LabStates {
   /** Settles when the last change queued by {@link enqueue} is complete. */
   #queue: Promise<unknown> = Promise.resolve();
   readonly #changes = new Observable(0);
+  readonly #cancellable = new Observable(false);
+  /** Whether something else can be opened in place of what is being opened. */
+  #hasOther = false;
   /** Whether the worker has a model of the lab's data. */
   ready = false;
   /** Whether the worker has to be restarted before it can serve requests. */
@@ -29,6 +32,7 @@ export class LabStates {
     this.#banner = banner;
     this.#status = status;
     this.#signal = signal;
+    this.#state.subscribe(() => this.#offerCancel());
   }
 
   /** Calls `subscriber` with the lab's state now and at every change. */
@@ -42,6 +46,16 @@ export class LabStates {
   /** Calls `subscriber` now, and whenever changes begin or are complete, with whether changes are under way. */
   subscribeChanging(subscriber: (isChanging: boolean) => void): void {
     this.#changes.subscribe((count) => subscriber(count > 0));
+  }
+
+  /** Calls `subscriber` now, and whenever it changes, with whether the lab is busy with something that can be cancelled. */
+  subscribeCancellable(subscriber: (isCancellable: boolean) => void): void {
+    this.#cancellable.subscribe(subscriber);
+  }
+
+  /** What is cancelled gives way to what was open before, or to something else. */
+  #offerCancel(): void {
+    this.#cancellable.value = this.value === 'loading' && (this.ready || this.#hasOther);
   }
 
   get value(): LabState {
@@ -77,12 +91,14 @@ export class LabStates {
 
   /**
    * Prepares for opening other data: enters the loading state, with `text` in the status line, and waits until queued
-   * changes are complete. Until {@link finishOpening} is called, the present model's state is recorded, but not
+   * changes are complete. `hasOther` tells whether a lab that has no data yet could open something else instead. Until {@link finishOpening} is called, the present model's state is recorded, but not
    * displayed.
    */
-  async open(text: string): Promise<void> {
+  async open(text: string, hasOther: boolean): Promise<void> {
     this.#opening = true;
     this.load(text);
+    this.#hasOther = hasOther;
+    this.#offerCancel();
     await this.#queue;
   }
 

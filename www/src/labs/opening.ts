@@ -322,6 +322,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     if (this.states.canChange) this.save();
     const changesDone = this.states.open(
       reopening ? text('labs.restartingEngine') : text('labs.opening', { name: source.name }),
+      source.example !== this.first || source.linked !== undefined || source.session !== undefined,
     );
     try {
       await this.#started;

@@ -114,8 +114,8 @@ export class Sessions {
   }
 
   async #read(file: File): Promise<void> {
-    const [{ readSession }, { unpackApart }] = await Promise.all([format(), import('../archive/apart')]);
-    const session = await readSession(new Uint8Array(await file.arrayBuffer()), unpackApart);
+    const { readApart } = await import('../session/apart');
+    const session = await readApart(new Uint8Array(await file.arrayBuffer()));
     if (session.lab === this.#lab.id) await this.#open(session);
     else this.#lab.passOn({ lab: session.lab, session, name: '', bytes: new Uint8Array(), params: {} });
   }

@@ -16,9 +16,11 @@ const VERSION = 1;
 
 /** Largest number of bytes that are unpacked. A session without its data is far below. */
 const MOST_BYTES = 2 ** 30;
-/** Largest size of `session.json` in bytes, and most values in it: the page does not answer while it is read. */
+/** Largest size of `session.json` in bytes, and most values in it. */
 const MOST_INDEX = 2 ** 27;
 const MOST_VALUES = 5e6;
+/** Largest size of a file that is small, and of the `session.json` in it. */
+const [SMALL, MOST_INDEX_OF_SMALL] = [2 ** 17, 2 ** 23];
 
 export type { Session };
 
@@ -73,24 +75,27 @@ export async function writeSession({ lab, hash, source, content }: NewSession): 
   const sums = Object.entries(parts).map(async ([name, part]) => [name, await sha256(part)] as const);
   const index = { format: FORMAT, version: VERSION, ...body, parts: Object.fromEntries(await Promise.all(sums)) };
   const packed = strToU8(JSON.stringify(index));
-  requireSize(packed);
+  requireSize(packed, MOST_INDEX);
   const files: Zippable = { [INDEX]: packed };
   // Most data are compressed already.
   for (const [name, part] of Object.entries(parts)) files[name] = [part, { level: name.startsWith('source/') ? 0 : 1 }];
-  return zipSync(files);
+  const archive = zipSync(files);
+  if (packed.length <= mostIndex(archive)) return archive;
+  // One that repeats itself so much is not packed, so that it can be read.
+  return zipSync({ ...files, [INDEX]: [packed, { level: 0 }] });
 }
 
-/** Unpacks an archive; see {@link unpack}. */
-type Unpack = (archive: Uint8Array, mostBytes: number, refusal: string) => Parts | Promise<Parts>;
+/** Returns the largest size of the `session.json` in a file: a small file could unpack to a thousand times its size. */
+const mostIndex = (file: Uint8Array) => (file.length <= SMALL ? MOST_INDEX_OF_SMALL : MOST_INDEX);
 
-/**
- * Reads a session, which `unpacking` unpacks: the page has a worker do it. Throws an Error whose message says what is wrong
- * with the file.
- */
+/** Unpacks an archive; see {@link unpack}. */
+type Unpack = (archive: Uint8Array, mostBytes: number, refusal: string) => Parts;
+
+/** Reads a session, which `unpacking` unpacks. Throws an Error whose message says what is wrong with the file. */
 export async function readSession(bytes: Uint8Array, unpacking: Unpack = unpack): Promise<Session> {
-  const { [INDEX]: packed, ...parts } = await partsOf(bytes, unpacking);
+  const { [INDEX]: packed, ...parts } = partsOf(bytes, unpacking);
   if (!packed) throw new Error(text('sessions.noIndex'));
-  requireSize(packed);
+  requireSize(packed, mostIndex(bytes));
   const { format: _, version, parts: sums, ...body } = indexOf(strFromU8(packed));
   if (version > VERSION) throw new Error(text('sessions.newer', { version, known: VERSION }));
   const verified = await verify(new Map(Object.entries(parts)), sums);
@@ -105,13 +110,13 @@ export async function readSession(bytes: Uint8Array, unpacking: Unpack = unpack)
 }
 
 /** Throws an Error if a `session.json` is too large. */
-function requireSize(index: Uint8Array): void {
+function requireSize(index: Uint8Array, most: number): void {
   let values = 1;
   // Each value but the first follows a comma or a bracket; those in texts are counted, too.
-  if (index.length <= MOST_INDEX)
+  if (index.length <= most)
     for (const byte of index) if (byte === COMMA || byte === LIST || byte === OBJECT) values += 1;
-  if (index.length <= MOST_INDEX && values <= MOST_VALUES) return;
-  throw new Error(text('sessions.indexTooLarge', { megabytes: MOST_INDEX / 2 ** 20, millions: MOST_VALUES / 1e6 }));
+  if (index.length <= most && values <= MOST_VALUES) return;
+  throw new Error(text('sessions.indexTooLarge', { megabytes: most / 2 ** 20, millions: MOST_VALUES / 1e6 }));
 }
 
 /** Returns the parts that are listed, all of which have the checksums of the list. */
@@ -135,9 +140,9 @@ function decoded(body: unknown, find: (part: string) => Uint8Array): Record<stri
   }
 }
 
-async function partsOf(bytes: Uint8Array, unpacking: Unpack): Promise<Parts> {
+function partsOf(bytes: Uint8Array, unpacking: Unpack): Parts {
   try {
-    return await unpacking(bytes, MOST_BYTES, TOO_LARGE);
+    return unpacking(bytes, MOST_BYTES, TOO_LARGE);
   } catch (error) {
     throw error instanceof ArchiveTooLarge ? error : new Error(text('sessions.notZip'));
   }

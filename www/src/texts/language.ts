@@ -5,14 +5,17 @@ export type Language = keyof typeof LANGUAGES;
 /** Under this key the browser keeps the language that the user has chosen. */
 const KEPT = 'vesicle.language';
 
-const isLanguage = (name: string | null): name is Language => name !== null && name in LANGUAGES;
+const isLanguage = (name: string | null | undefined): name is Language =>
+  name != null && Object.hasOwn(LANGUAGES, name);
 
 /**
- * Returns the language of the page: of its address (`?lang=de`), or else the one chosen before; English in workers and
- * on pages that do not offer a choice, as their `data-languages` says.
+ * Returns the language of the page: of its address (`?lang=de`), or else the one chosen before; English on pages that do
+ * not offer a choice, as their `data-languages` says. In workers it is that which they are named after, or else English.
  */
 export function chosenLanguage(): Language {
-  if (!('document' in globalThis) || !('languages' in document.documentElement.dataset)) return 'en';
+  const { name } = globalThis as { name?: string };
+  if (!('document' in globalThis)) return isLanguage(name) ? name : 'en';
+  if (!('languages' in document.documentElement.dataset)) return 'en';
   const asked = new URL(location.href).searchParams.get('lang');
   const chosen = isLanguage(asked) ? asked : keptLanguage();
   return isLanguage(chosen) ? chosen : 'en';

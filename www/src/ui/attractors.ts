@@ -1,3 +1,4 @@
+import { MOST_ATTRACTORS } from '../attractors';
 import { shortenedPoint } from '../placing';
 import type { Attractor, Vec3 } from '../protocol';
 import { text } from '../texts';
@@ -100,6 +101,10 @@ export class AttractorControls {
   }
 
   add(point: Vec3): void {
+    if (this.#attractors.length >= MOST_ATTRACTORS) {
+      this.showError(text('extractPanels.attractorsFull', { most: MOST_ATTRACTORS }));
+      return;
+    }
     const rounded = shortenedPoint(point, 6, this.#size);
     this.#change(
       [...this.#attractors, { point: rounded, strength: STRENGTH, radius: this.#radius }],

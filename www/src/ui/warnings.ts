@@ -6,6 +6,8 @@ import { h, icon } from './dom';
 const TRIANGLE = 'M12 2 1 21h22L12 2Zm-1 7h2v6h-2V9Zm0 8h2v2h-2v-2Z';
 /** Number of warnings from which on the list may scroll, and can be reached by the keyboard to do so. */
 const LONG = 4;
+/** Most warnings that are listed; the number of the others is stated. */
+const MOST_LISTED = 200;
 
 /** Kinds that are about a result, and not about data. */
 const OF_RESULTS: readonly string[] = [
@@ -104,7 +106,9 @@ export class WarningList {
     const { length } = this.#shown;
     this.#box.hidden = length === 0;
     this.#title.replaceChildren(icon(TRIANGLE), plural('warnings.title', length));
-    this.#list.replaceChildren(...this.#shown.map((warning) => this.#item(warning)));
+    const items = this.#shown.slice(0, MOST_LISTED).map((warning) => this.#item(warning));
+    const others = length - items.length;
+    this.#list.replaceChildren(...items, ...(others > 0 ? [h('li', {}, plural('warnings.more', others))] : []));
     const scrolls = length > LONG ? { tabindex: '0', role: 'region', 'aria-label': text('warnings.list') } : {};
     for (const name of ['tabindex', 'role', 'aria-label']) this.#box.removeAttribute(name);
     for (const [name, value] of Object.entries(scrolls)) this.#box.setAttribute(name, value);

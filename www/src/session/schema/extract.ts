@@ -1,5 +1,6 @@
 /** Sessions of the Extract lab. */
 import { literal, object, optional, picklist, undefined_, variant } from 'valibot';
+import { MOST_ATTRACTORS } from '../../attractors';
 import type { StartShape } from '../../protocol';
 import type { ColorMode } from '../../ui/view-options';
 import { call, camera, history, log, placement, reports, session, steps, undoable } from './parts';
@@ -10,7 +11,7 @@ const start = variant('kind', [
   object({ kind: literal('bubbles'), count: real }),
   object({ kind: literal('sphere'), center: vec3, radius: real }),
 ]);
-const attractors = list(object({ point: vec3, strength: real, radius: real }), 10_000);
+const attractors = list(object({ point: vec3, strength: real, radius: real }), MOST_ATTRACTORS);
 const setup = object({
   ...{ start, levels: count, edge: maybe(real), params, attractors },
   box: optional(object({ min: vec3, max: vec3 })),

@@ -21,10 +21,11 @@ import { anyNumber, between, bytes, count, flag, list, name, named, oneOf, real,
 const warning = object({
   // Later versions may have other kinds.
   code: custom<Warning['code']>((value) => typeof value === 'string' && /^[a-z-]{1,100}$/.test(value)),
-  text: text(),
+  text: text(2000),
   where: optional(union([object({ frame: count }), object({ label: real }), object({ point: vec3 })])),
 });
-const warnings = list(warning, 10_000);
+/** The package has up to 1000, of data and of a result. */
+const warnings = list(warning, 2000);
 
 const notes = object({
   warnings,
@@ -60,7 +61,7 @@ const edit = variant('op', [
   object({ op: literal('decimate'), targetTriangles: real }),
   object({ op: literal('decimateWithin'), maxDistance: real }),
   object({ op: literal('smooth'), iterations: between(0, 1e6), keepVolume: flag }),
-  object({ op: literal('keepComponents'), indices: list(count, 1e7) }),
+  object({ op: literal('keepComponents'), indices: list(count, 1e6) }),
   object({ op: literal('removeCavities') }),
   object({ op: literal('cut'), origin: vec3, normal: vec3 }),
 ]);

@@ -4,8 +4,8 @@ import type { SurfaceColor } from '../../view/surface';
 import { call, camera, log, report, reports, session, steps, undoable } from './parts';
 import { bytes, count, flag, list, maybe, oneOf, params, vec3 } from './values';
 
-const points = list(vec3, 1e6);
-const edits = object({ added: points, removed: list(count, 1e7), outside: points });
+const points = list(vec3, 1e5);
+const edits = object({ added: points, removed: list(count, 1e6), outside: points });
 const choice = { maxPoints: maybe(count), keepComponents: maybe(count) };
 const setup = object({ params, ...choice, edits });
 const calls = variant('call', [steps, call('setParams', params), call('setEdits', edits)]);

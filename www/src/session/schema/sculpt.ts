@@ -5,8 +5,8 @@ import { call, camera, history, log, reports, session, steps, undoable } from '.
 import { color } from './reconstruct';
 import { between, bytes, count, flag, list, maybe, name, oneOf, params, text, vec3 } from './values';
 
-const pose = list(object({ center: vec3, axes: strictTuple([vec3, vec3, vec3]) }), 10_000);
-const keys = pipe(list(pose, 10_000), minLength(1));
+const pose = list(object({ center: vec3, axes: strictTuple([vec3, vec3, vec3]) }), 1000);
+const keys = pipe(list(pose, 1000), minLength(1));
 const film = union([
   object({ keys, between: between(1, 10_000), loop: flag }),
   object({ motion: literal('lava'), loop: flag }),
@@ -16,7 +16,7 @@ const support = optional(oneOf<Support>({ surface: true, membrane: true }));
 const moment = {
   state: bytes,
   model: object({ start: pose, support, iteration: count, frame: count, log: optional(text(100)) }),
-  page: object({ names: list(name, 10_000), posed: flag, film: maybe(film), history }),
+  page: object({ names: list(name, 1000), posed: flag, film: maybe(film), history }),
 };
 const layout = oneOf<Layout>({ result: true, base: true, pair: true, row: true, levels: true, stages: true });
 const view = object({ camera, options: object({ layout, edges: flag, ellipsoids: flag, color }) });

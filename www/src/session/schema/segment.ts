@@ -41,7 +41,8 @@ const view = object({
   ...{ camera, crosshair: vec3 },
   options: object({ edges: flag, outlines: flag, slices: placement, opacity }),
 });
-const most = 2 ** 16;
+/** Files may have 4000, and a few may be added. */
+const most = 4500;
 
 export const segment = object({
   ...{ lab: literal('segment'), ...session },
