@@ -1,7 +1,6 @@
 //! Files beside the header of a volume: which ones a header names, and where they are among those that a caller gives.
 
 use super::FormatError;
-use super::small::check_unpacked;
 use std::borrow::Cow;
 
 /// Files beside a header, among which a reader finds those that the header names.
@@ -249,7 +248,6 @@ pub(super) fn joined(
         let problem = format!("{} files cannot have equal parts of {size} bytes of voxels", found.len());
         return Err(FormatError::invalid(format, "files", problem));
     }
-    check_joined(format, files, found, size)?;
     let mut out = Vec::new();
     out.try_reserve_exact(size).map_err(|_| FormatError::too_large(format, "voxel data", size as u64))?;
     for file in found {
@@ -266,24 +264,6 @@ pub(super) fn joined(
         })?;
     }
     Ok(out)
-}
-
-/// Returns an error if several files may not unpack to `size` bytes together.
-fn check_joined(
-    format: &'static str,
-    files: &dyn FileSet,
-    found: &[Found],
-    size: usize,
-) -> Result<(), FormatError> {
-    let mut stored = 0;
-    for file in found {
-        // The files of most volumes are large: it is enough to look at the first.
-        if check_unpacked(format, stored, size).is_ok() {
-            return Ok(());
-        }
-        stored += with_file(files, file, |bytes| Ok(bytes.len()))?;
-    }
-    check_unpacked(format, stored, size)
 }
 
 #[cfg(test)]

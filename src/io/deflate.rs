@@ -2,11 +2,9 @@
 
 use super::FormatError;
 use super::gzip::crc32;
-use super::small::{SMALL, check_unpacked};
 use miniz_oxide::deflate::core::{
     CompressorOxide, TDEFLFlush, TDEFLStatus, compress, create_comp_flags_from_zip_params,
 };
-use miniz_oxide::mz_adler32_oxide;
 
 /// Level of compression, 0 to 10: the usual one of gzip. Higher ones take several times as long for some percent.
 const LEVEL: i32 = 6;
@@ -20,7 +18,7 @@ const BUFFER: usize = 1 << 16;
 /// [`FormatError::TooLarge`] if there is not enough memory.
 pub(super) fn gzip(format: &'static str, bytes: &[u8]) -> Result<Vec<u8>, FormatError> {
     let mut out = vec![0x1F, 0x8B, 8, 0, 0, 0, 0, 0, 0, 255];
-    pack(format, bytes, false, &mut out)?;
+    deflate(format, bytes, 0, &mut out)?;
     out.extend(crc32(bytes).to_le_bytes());
     // The format stores the length modulo 2^32.
     out.extend((bytes.len() as u32).to_le_bytes());
@@ -33,38 +31,8 @@ pub(super) fn gzip(format: &'static str, bytes: &[u8]) -> Result<Vec<u8>, Format
 /// As [`gzip`].
 pub(super) fn zlib(format: &'static str, bytes: &[u8]) -> Result<Vec<u8>, FormatError> {
     let mut out = Vec::new();
-    pack(format, bytes, true, &mut out)?;
+    deflate(format, bytes, 15, &mut out)?;
     Ok(out)
-}
-
-/// Bytes of a block that is not compressed, at most.
-const BLOCK: usize = u16::MAX as usize;
-
-/// Appends a deflate stream that contains `bytes` to `out`, in a zlib container if `zlib`. One that would be so small that it
-/// may not be unpacked begins with blocks that are not compressed.
-fn pack(format: &'static str, bytes: &[u8], zlib: bool, out: &mut Vec<u8>) -> Result<(), FormatError> {
-    let start = out.len();
-    deflate(format, bytes, if zlib { 15 } else { 0 }, out)?;
-    if check_unpacked(format, out.len() - start, bytes.len()).is_ok() {
-        return Ok(());
-    }
-    out.truncate(start);
-    if zlib {
-        out.extend([0x78, 0x01]);
-    }
-    let (first, rest) = bytes.split_at(SMALL);
-    for block in first.chunks(BLOCK) {
-        let length = block.len() as u16;
-        out.push(0);
-        out.extend(length.to_le_bytes());
-        out.extend((!length).to_le_bytes());
-        out.extend_from_slice(block);
-    }
-    deflate(format, rest, 0, out)?;
-    if zlib {
-        out.extend(mz_adler32_oxide(1, bytes).to_be_bytes());
-    }
-    Ok(())
 }
 
 /// Appends a deflate stream that contains `bytes` to `out`, in a zlib container if `window_bits` is above 0.
@@ -96,7 +64,6 @@ fn deflate(
 mod tests {
     use super::*;
     use crate::io::gzip::{gunzip, unzlib};
-    use crate::io::small::MOST_OF_SMALL;
     use crate::math::Random;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -112,15 +79,5 @@ mod tests {
             }
         }
         assert!(gzip("t", &vec![7; 1_000_000]).unwrap().len() < 2000);
-    }
-
-    #[test]
-    fn what_packs_too_well_to_be_unpacked_again_is_not_packed_at_its_beginning() {
-        let content = vec![7; MOST_OF_SMALL + 1];
-        for packed in [gzip("t", &content).unwrap(), zlib("t", &content).unwrap()] {
-            assert!((SMALL..2 * SMALL).contains(&packed.len()), "{}", packed.len());
-        }
-        assert!(gunzip("t", &gzip("t", &content).unwrap(), content.len()).unwrap() == content);
-        assert!(unzlib("t", &zlib("t", &content).unwrap(), content.len()).unwrap() == content);
     }
 }

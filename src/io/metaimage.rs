@@ -10,7 +10,6 @@ use super::beside::{DataFiles, Series, pattern_and_numbers};
 use super::colour::{Colours, luminance_of};
 use super::gzip::{gunzip, is_gzip, unzlib};
 use super::raw::{FieldName, MAX_PADDING, Scalar, decode, decode_text, payload, payload_size, volume_of};
-use super::small::check_unpacked;
 use super::source::Source;
 use super::text::{Field, Lines};
 use super::units::{metres, thickness_warning, unit_of};
@@ -258,7 +257,6 @@ impl Header {
             return Ok(Cow::Borrowed(self.after_skip(bytes, size)?));
         }
         let source = self.after_skip(bytes, bytes.len())?;
-        check_unpacked(FORMAT, source.len(), size)?;
         // The format says zlib; some writers put a gzip stream there.
         let inflate = if is_gzip(source) { gunzip } else { unzlib };
         Ok(Cow::Owned(inflate(FORMAT, source, size.saturating_add(MAX_PADDING))?))

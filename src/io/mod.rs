@@ -31,7 +31,6 @@ mod ply;
 mod point_text;
 mod points;
 mod raw;
-mod small;
 mod source;
 mod stl;
 mod text;

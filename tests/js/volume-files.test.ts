@@ -1,6 +1,5 @@
 // Files of volumes: several files, spaces that files do not tell, and units of length.
-import { deflateSync, gzipSync } from 'node:zlib';
-import { afterAll, describe, expect, test } from 'vitest';
+import { afterAll, expect, test } from 'vitest';
 import initFiles, { parseVolume } from '../../pkg/import/index.js';
 import { Volume } from '../../pkg/index.js';
 import initWorker, * as worker from '../../pkg/worker.js';
@@ -109,62 +108,4 @@ test('NaN is NaN in the intensities, and the lower end of the range where it is 
   expect([...volume.intensities()]).toEqual([Number.NaN, 2, 5, Number.NaN]);
   expect([...volume.slice(2, 0)]).toEqual([2, 2, 5, 2]);
   expect(volume.sample([0, 0, 0])).toBe(2);
-});
-
-describe('compressed files of up to 128 KiB', () => {
-  const SIDE = 330;
-  const voxels = new Uint8Array(SIDE ** 3);
-  const nrrd = (file: string) =>
-    `NRRD0004\ntype: uint8\ndimension: 3\nsizes: ${SIDE} ${SIDE} ${SIDE}\nencoding: gzip\n${file}\n`;
-  const nifti = () => {
-    const header = new Uint8Array(352);
-    const view = new DataView(header.buffer);
-    view.setInt32(0, 348, true);
-    for (const [k, size] of [3, SIDE, SIDE, SIDE].entries()) view.setInt16(40 + 2 * k, size, true);
-    for (const [at, value] of [
-      [70, 2],
-      [72, 8],
-    ] as const)
-      view.setInt16(at, value, true);
-    for (const at of [76, 80, 84, 88, 112]) view.setFloat32(at, 1, true);
-    view.setFloat32(108, 352, true);
-    header.set(bytesOf('n+1'), 344);
-    return gzipSync(Buffer.concat([header, voxels]));
-  };
-  const mha = () => {
-    const packed = deflateSync(voxels);
-    const fields = [`DimSize = ${SIDE} ${SIDE} ${SIDE}`, 'ElementType = MET_UCHAR', 'CompressedData = True'];
-    const header = ['NDims = 3', ...fields, `CompressedDataSize = ${packed.length}`, 'ElementDataFile = LOCAL', ''];
-    return Buffer.concat([bytesOf(header.join('\n')), packed]);
-  };
-  const slices = Array.from({ length: SIDE }, (_, k) => ({
-    name: `s${k}.gz`,
-    bytes: new Uint8Array(gzipSync(voxels.subarray(0, SIDE ** 2))),
-  }));
-  const listed = `data file: s%d.gz 0 ${SIDE - 1} 1 2\n`;
-
-  test.each([
-    ['NIfTI', nifti(), {}],
-    ['NRRD', Buffer.concat([bytesOf(nrrd('')), gzipSync(voxels)]), {}],
-    ['MetaImage', mha(), {}],
-    ['NRRD', bytesOf(nrrd(listed)), { files: slices }],
-  ])('do not unpack to more than 32 MiB: %s', (format, bytes, options) => {
-    const error = failure(() => Volume.parse(new Uint8Array(bytes), options));
-    expect([error.code, error.message]).toEqual([
-      'too-large',
-      expect.stringMatching(`${format}: voxels: .* 32 MiB; store them uncompressed: needs 35937000 bytes`),
-    ]);
-  });
-
-  test('are not what is written', () => {
-    const volume = new Volume({ data: voxels, dims: [SIDE, SIDE, SIDE], slope: 1 });
-    for (const format of ['nifti', 'nrrd', 'mha'] as const) {
-      const bytes = volume.toBytes(format, { gzip: true });
-      expect(bytes.length).toBeLessThan(2 ** 18);
-      const again = Volume.parse(bytes);
-      expect(again.dims).toEqual([SIDE, SIDE, SIDE]);
-      again.free();
-    }
-    volume.free();
-  });
 });

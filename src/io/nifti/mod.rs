@@ -16,7 +16,6 @@ use super::beside::with_single;
 use super::colour::{Colours, luminance_of};
 use super::gzip::{gunzip, gunzip_start, is_gzip};
 use super::raw::{FieldName, MAX_PADDING, Scalar, decode, payload, payload_size, volume_of};
-use super::small::check_unpacked;
 use super::{FormatError, VolumeOptions};
 use crate::math::DAffine3;
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit};
@@ -140,7 +139,6 @@ impl Header {
         let end = self.offset.checked_add(size);
         let end = end.ok_or_else(|| FormatError::too_large(FORMAT, "vox_offset", u64::MAX))?;
         if is_gzip(source) {
-            check_unpacked(FORMAT, source.len(), size)?;
             let whole = gunzip(FORMAT, source, end.saturating_add(MAX_PADDING))?;
             return self.volume_of(&whole, size);
         }

@@ -24,7 +24,6 @@ use super::beside::{DataFiles, Series, pattern_and_numbers};
 use super::colour::{Colours, luminance_of};
 use super::gzip::gunzip;
 use super::raw::{FieldName, MAX_PADDING, Scalar, decode, decode_text, payload, payload_size, volume_of};
-use super::small::check_unpacked;
 use super::source::Source;
 use super::text::{Field, Lines};
 use super::{FormatError, VolumeOptions};
@@ -205,7 +204,6 @@ impl Header {
             Encoding::Hex => Ok(Cow::Owned(unhex(self.after_bytes(bytes, size)?, size)?)),
             Encoding::Gzip => {
                 let skip = self.byte_skip.unwrap_or(0);
-                check_unpacked(FORMAT, bytes.len(), size)?;
                 let limit = size.saturating_add(skip).saturating_add(MAX_PADDING);
                 let mut whole = gunzip(FORMAT, bytes, limit)?;
                 self.after_bytes(&whole, size)?;
