@@ -13,6 +13,7 @@ const OF_RESULTS: readonly string[] = [
   'ends-in-frame',
   'handle-stopped',
   'handles',
+  'inward-normals',
   'no-boundary',
   'self-intersecting',
   'outliers',
