@@ -155,7 +155,7 @@ impl Extraction {
     }
 
     /// Returns the vertex of the finished surface `mesh` where the function separates inside and outside least clearly, if that is
-    /// hardly at all and a point is within `reach`: sheets that the points do not tell apart may be joined there. Elsewhere,
+    /// hardly at all and a point is within `reach`: sheets that the points leave in doubt may be joined there. Elsewhere,
     /// between points, the function may be flat.
     pub fn unclear(&self, mesh: &TriangleMesh, reach: f32) -> Option<Vec3> {
         let least = UNCLEAR * median(self.slopes.iter().copied())?;

@@ -123,9 +123,10 @@ const COARSE_SHARE: f64 = 0.1;
 
 const AMBIGUOUS: &str = "inside and outside are ambiguous: walls or gaps are about as thin as the spacing of the points or \
                          their noise; components, handles and volume may be wrong";
-const UNCLEAR: &str = "inside and outside are hardly told apart here: a wall or gap is about as thin as the spacing of the \
+const UNCLEAR: &str = "inside and outside are hardly distinguished here: a wall or gap is about as thin as the spacing of the \
                        points or their noise, and may be bridged or broken; components, handles and volume may be wrong";
-const INWARD: &str = "the normals that were given point inwards on the whole: the outside is taken for the inside; reverse them";
+const INWARD: &str =
+    "the normals that were given point inwards on the whole: inside and outside are exchanged; reverse them";
 const COARSE: &str = "the points are rounded to single precision, which is coarse beside their spacing so far from the origin: \
                       give them in double precision, or move them to the origin before they are rounded";
 /// Seed of all random choices: a constant, so that equal input gives equal results.

@@ -17,6 +17,7 @@ const OF_RESULTS: readonly string[] = [
   'no-boundary',
   'self-intersecting',
   'outliers',
+  'parts',
   'small-object',
   'thin-label',
   'thin-parts',
