@@ -324,8 +324,9 @@ export class ImplicitSurface implements Stepper {
 
   /**
    * Replaces all manual edits of the points: some are added, some left out; `{}` discards all edits. Live: the surface
-   * stays until the new one is complete. Up to some 250 edits of each kind update the system solved last, reusing its
-   * matrix and solution; more are solved from the start. If only a subsample is used, a removed point is not replaced
+   * stays until the new one is complete, which depends on these edits, and not on those before or on when they are made. Up to
+   * some 250 edits of each kind revise the system without edits, reusing its matrix and solution; more are solved from the
+   * start. If only a subsample is used, a removed point is not replaced
    * by another.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the list that is wrong: a number that is not finite, a point

@@ -13,7 +13,7 @@ const CODES: Record<WarningCode, true> = {
   ...{ 'touches-box': true, handles: true, 'no-boundary': true, 'volume-jump': true },
   ...{ 'handle-stopped': true, 'self-intersecting': true },
   'thin-label': true,
-  ...{ 'thin-parts': true, outliers: true },
+  ...{ parts: true, 'thin-parts': true, 'inward-normals': true, outliers: true },
   ...{ precision: true, recentred: true, anisotropic: true, reader: true },
 };
 

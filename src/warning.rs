@@ -90,6 +90,10 @@ codes! {
     /// Parts of the surface, or gaps between them, are so thin that the points hardly tell them apart: topology and volume
     /// may be wrong.
     ThinParts = "thin-parts",
+    /// The surface has not as many parts as the object.
+    Parts = "parts",
+    /// The normals that were given point inwards: inside and outside are exchanged.
+    InwardNormals = "inward-normals",
     /// A few points are so far from the others that these are a small part of the box: cells are too large for the object.
     Outliers = "outliers",
     /// Positions or intensities are rounded more than the result should suffer.

@@ -108,10 +108,11 @@ impl ParamSpec {
         Self { choices: Some(choices), ..self }
     }
 
-    /// Returns the type of the parameter's values in words, for messages: "a number", or the words to choose from.
+    /// Returns the type of the parameter's values in words, for messages: "a number", "a number or 'auto'", or the words to choose from.
     pub fn expected(&self) -> String {
         match (self.kind, self.choices) {
-            (ParamKind::Number, _) => "a number".into(),
+            (ParamKind::Number, None) => "a number".into(),
+            (ParamKind::Number, Some(words)) => format!("a number or '{}'", words.join("', '")),
             (ParamKind::Integer, _) => "a whole number".into(),
             (ParamKind::Boolean, _) => "true or false".into(),
             (ParamKind::Choice, words) => {

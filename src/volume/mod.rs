@@ -72,7 +72,7 @@ pub(crate) use sampling::trilinear;
 pub(crate) use sparse::merged;
 pub use sparse::{BrickBox, SparseInit, SparseLevel, SparseVolume};
 pub(crate) use subdivided::Subdivided;
-pub use surface_extractor::{Lattice, SurfaceExtractor};
+pub use surface_extractor::{Lattice, MAX_NODES, SurfaceExtractor};
 pub use voxels::Voxels;
 pub(crate) use voxels::{VoxelNumber, map_each};
 

@@ -10,7 +10,7 @@ use vesicle::methods::Auto;
 use vesicle::methods::implicit::{
     Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits, Sides,
 };
-use vesicle::warning::WarningCode;
+use vesicle::warning::{Place, WarningCode};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -93,6 +93,28 @@ fn two_balls_with_a_small_gap_stay_apart() {
     }
 }
 
+/// Where the gap is narrower than the points are apart, it is bridged: the warning names a point there.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn a_gap_narrower_than_the_spacing_of_the_points_gives_a_warning() {
+    for (gap, is_clear) in [(0.04, false), (0.3, true)] {
+        let ball = |seed: u64, side: f32| {
+            let ball = noisy(sphere, 750, 0.0, seed);
+            ball.into_iter().map(move |p| p + Vec3::X * side * (1.0 + gap / 2.0)).collect::<Vec<_>>()
+        };
+        let mut surface = finished([ball(1, -1.0), ball(2, 1.0)].concat());
+        assert_eq!(euler_of_parts(surface.surface()).len(), if is_clear { 2 } else { 1 });
+        let warnings = surface.step().unwrap().warnings;
+        let mut restored =
+            begun(Cloud { points: [ball(1, -1.0), ball(2, 1.0)].concat(), ..Cloud::default() });
+        restored.restore(&surface.save()).unwrap();
+        assert_eq!(restored.step().unwrap().warnings, warnings);
+        let is_there = |place: &Option<Place>| matches!(place, Some(Place::Point(p)) if p[0].abs() < 0.3);
+        let found = warnings.iter().filter(|one| one.code == WarningCode::ThinParts && is_there(&one.place));
+        assert_eq!((found.count(), warnings.len()), if is_clear { (0, 0) } else { (1, 1) }, "{warnings:?}");
+    }
+}
+
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_cavity_stays_hollow() {
@@ -135,10 +157,87 @@ fn parts_as_thin_as_the_noise_give_a_warning() {
 fn normals_that_are_given_decide_the_side() {
     let points = noisy(sphere, 1500, 0.0, 3);
     let inwards: Vec<Vec3> = points.iter().map(|p| -p.normalize()).collect();
+    let outwards = inwards.iter().map(|n| -n).collect();
+    let mut right = begun(Cloud { points: points.clone(), normals: Some(outwards), ..Cloud::default() });
+    assert_eq!(right.step().unwrap().warnings, []);
     let mut surface = begun(Cloud { points, normals: Some(inwards), ..Cloud::default() });
     while !surface.step().unwrap().done {}
-    // Inside and outside are exchanged.
+    // Inside and outside are exchanged, and there is a warning.
     assert!(surface.evaluate(&[Vec3::ZERO]).unwrap()[0] < 0.0);
+    assert_eq!(surface.step().unwrap().warnings[0].code, WarningCode::InwardNormals);
+}
+
+#[test]
+fn points_rounded_by_much_of_their_spacing_give_a_warning() {
+    let codes = |away: f64, rounds: bool| {
+        let ball = noisy(sphere, 1000, 0.0, 3);
+        let origin = DVec3::splat(away);
+        let rounded = |p: &Vec3| {
+            let p = p.as_dvec3() * 5.0 + origin;
+            (if rounds { p.as_vec3().as_dvec3() } else { p } - origin).as_vec3()
+        };
+        let mut surface =
+            begun(Cloud { points: ball.iter().map(rounded).collect(), origin, ..Cloud::default() });
+        while surface.step().unwrap().phase == "subsample" {}
+        surface.step().unwrap().warnings.iter().map(|one| one.code).collect::<Vec<_>>()
+    };
+    assert_eq!(codes(5e6, true), [WarningCode::Precision]);
+    for (away, rounds) in [(5e6, false), (5e3, true), (0.0, true)] {
+        assert_eq!(codes(away, rounds), [], "{away} {rounds}");
+    }
+}
+
+#[test]
+fn a_cell_that_does_not_suit_the_points_is_refused_in_words() {
+    for cell in [1e-6, 100.0] {
+        let params = ImplicitParams { cell, ..ImplicitParams::default() };
+        let options = ImplicitOptions { params, ..ImplicitOptions::default() };
+        let cloud = Cloud { points: noisy(sphere, 300, 0.0, 3), ..Cloud::default() };
+        let mut surface = ImplicitSurface::new(cloud, options).unwrap();
+        let failure = loop {
+            if let Err(failure) = surface.step() {
+                break failure.to_string();
+            }
+        };
+        assert!(failure.contains("must be 0, or from "), "{failure}");
+    }
+}
+
+/// Also after other edits, those of a saved run, and so many that the system is solved from scratch.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn edits_give_the_same_bits_whenever_they_are_made() {
+    let cloud = || Cloud { points: noisy(torus, 1200, 0.01, 5), ..Cloud::default() };
+    let removed = |count: u32| PointEdits { removed: (0..count).collect(), ..PointEdits::default() };
+    let added = PointEdits { added: vec![Vec3::new(0.0, 0.0, 0.1)], ..PointEdits::default() };
+    let all = [removed(40), added, removed(700), PointEdits::default(), removed(20)];
+    let direct = |edits: &PointEdits| {
+        let mut surface = begun(cloud());
+        surface.set_edits(edits.clone()).unwrap();
+        finish(&mut surface);
+        surface
+    };
+    let mut other = begun(cloud());
+    finish(&mut other);
+    for edits in &all {
+        let expected = direct(edits);
+        other.set_edits(removed(10)).unwrap();
+        for _ in 0..7 {
+            other.step().unwrap();
+        }
+        other.set_edits(edits.clone()).unwrap();
+        for _ in 0..5 {
+            other.step().unwrap();
+        }
+        let mut resumed = begun(cloud());
+        resumed.restore(&other.save()).unwrap();
+        assert_eq!(resumed.save(), other.save());
+        finish(&mut resumed);
+        assert!(resumed.surface() == expected.surface(), "resumed: {edits:?}");
+        finish(&mut other);
+        assert!(other.surface() == expected.surface(), "{edits:?}");
+        other.restore(&resumed.save()).unwrap();
+    }
 }
 
 /// Returns points far from a torus, on the outside.

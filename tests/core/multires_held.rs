@@ -375,3 +375,58 @@ fn random_poses_leave_the_surface_valid() {
     assert_at_least(15, steps, "steps");
     assert_at_least(20, halved as usize, "halved edges");
 }
+
+/// It goes as far as a near target, also where the surface folds up on the way to a far one.
+#[test]
+fn a_far_target_moves_a_handle_as_far_as_a_near_one() {
+    let dumbbell = shapes::joined(&[bumpy(Vec3::ZERO, 0.15), bumpy(Vec3::X * 2.4, 0.15)]);
+    let start = vec![ball(0.0, 0.0, 0.0, 0.7), ball(2.4, 0.0, 0.0, 0.7)];
+    let moved = |by: f64| {
+        let mut model = begun_with(dumbbell.clone(), &start);
+        let mut target = start.clone();
+        target[1].center[0] -= by;
+        model.set_ellipsoids(&target).unwrap();
+        settle(&mut model);
+        start[1].center[0] - model.ellipsoids()[1].center[0]
+    };
+    let near = [0.03, 0.06, 0.1].map(|by| moved(by));
+    let far = [0.2, 0.4, 0.8, 1.6].map(|by| moved(by));
+    println!("{near:?} {far:?}");
+    let most = near.into_iter().chain(far).fold(0.0, f64::max);
+    assert!(near[0] > 0.029 && far.iter().all(|by| *by > most - 0.02), "{near:?} {far:?}");
+}
+
+#[test]
+fn each_of_several_bodies_has_a_proposed_ball() {
+    for (count, apart) in [(2, 2.3), (3, 2.3), (2, 6.0)] {
+        let centres: Vec<Vec3> = (0..count).map(|i| Vec3::X * apart * i as f32).collect();
+        let bodies: Vec<_> = centres.iter().map(|&centre| bumpy(centre, 0.3)).collect();
+        let found = begun(shapes::joined(&bodies)).ellipsoids();
+        let is_in =
+            |centre: &Vec3| found.iter().any(|e| DVec3::from(e.center).distance(centre.as_dvec3()) < 1.0);
+        assert!(centres.iter().all(is_in), "{count} {apart}: {found:?}");
+    }
+}
+
+#[test]
+fn a_surface_that_is_inside_out_is_refused_in_words() {
+    let mut mesh = bumpy(Vec3::ZERO, 0.3);
+    mesh.triangles.iter_mut().for_each(|corners| corners.swap(0, 1));
+    let options = MultiresOptions { detail: Some(mesh), support: Support::Surface, ..Default::default() };
+    let problem = MultiresolutionModel::new(options).err().unwrap().to_string();
+    assert!(problem.starts_with("detail") && problem.contains("inside out"), "{problem}");
+}
+
+/// Over the balls proposed for a ring, a membrane comes apart.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn a_membrane_that_comes_apart_is_told() {
+    let ring = shapes::torus(1.0, 0.25, 60, 24);
+    let ellipsoids = begun(ring.clone()).ellipsoids();
+    let options =
+        MultiresOptions { detail: Some(ring), ellipsoids, support: Support::Membrane, ..Default::default() };
+    let mut model = MultiresolutionModel::new(options).unwrap();
+    let report = settle(&mut model);
+    assert!(report.components > 1);
+    assert_eq!(codes(&report), [WarningCode::Parts]);
+}

@@ -365,3 +365,89 @@ fn a_box_that_cuts_the_object_and_a_volume_that_jumps_are_told() {
     let jumps = tracker.warnings().into_iter().filter(|warning| warning.code == WarningCode::VolumeJump);
     assert_eq!(jumps.map(|warning| warning.place).collect::<Vec<_>>(), [Some(Place::Frame(3))]);
 }
+
+/// Returns a sequence of bright balls, given by frame as centres and radii.
+fn balls(dims: [usize; 3], frames: &[Vec<(DVec3, f64)>]) -> Volume {
+    let mut random = Random(5);
+    let mut values = Vec::new();
+    for balls in frames {
+        for i in 0..dims.iter().product() {
+            let at = [i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1])];
+            let p = DVec3::from(at.map(|k| k as f64));
+            let inside =
+                balls.iter().map(|(centre, radius)| radius - p.distance(*centre)).fold(f64::MIN, f64::max);
+            let noise: f64 = (0..6).map(|_| random.within(-1.0, 1.0)).sum::<f64>() * 4.0;
+            values.push((40.0 + 110.0 * (inside + 0.5).clamp(0.0, 1.0) + noise) as f32);
+        }
+    }
+    Volume::new(VolumeInit::new(Voxels::F32(values), [dims[0], dims[1], dims[2], frames.len()])).unwrap()
+}
+
+/// Both halves are tracked, and joined by a thread.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn an_object_that_divides_within_its_surface_is_told() {
+    let cells = |apart: &dyn Fn(f64) -> f64| {
+        let frame = |t: usize| {
+            [-1.0, 1.0].map(|side| (DVec3::new(24.0 + side * apart(t as f64), 16.0, 14.0), 7.0)).to_vec()
+        };
+        let frames: Vec<_> = (0..6).map(frame).collect();
+        let component = Component::Nearest(DVec3::new(20.0, 16.0, 14.0));
+        let options = TrackingOptions {
+            volume: balls([48, 32, 28], &frames),
+            bounds: None,
+            component,
+            start: None,
+            cavity: Cavity::Open,
+            params: TrackingParams::default(),
+        };
+        tracked(options)
+    };
+    let dividing = cells(&|t| 2.0 + 2.2 * t);
+    let warnings = dividing.warnings();
+    let told = warnings.iter().find(|one| one.code == WarningCode::Parts).unwrap();
+    // The gap is .4 voxels wide in the third frame, and 4.8 in the fourth.
+    assert!(matches!(told.place, Some(Place::Frame(2..=4))), "{told:?}");
+    assert_eq!(measure(dividing.meshes().last().unwrap()).components, 1);
+    // Two that stay together are one.
+    assert!(!codes(&cells(&|t| 4.0 + 0.3 * t)).contains(&WarningCode::Parts));
+}
+
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn a_proposed_box_holds_an_object_that_moves_far() {
+    for speed in [2.0, 3.0] {
+        let at = |t: usize| DVec3::new(36.0 + speed * (t as f64 - 4.5), 16.0, 14.0);
+        let frames: Vec<_> = (0..10).map(|t| vec![(at(t), 6.0)]).collect();
+        let volume = balls([72, 32, 28], &frames);
+        for query in
+            [Query::Moving, Query::Point { at: at(0), frame: 0 }, Query::Point { at: at(5), frame: 5 }]
+        {
+            let [low, high] = SurfaceTracker::propose(&volume, query).unwrap().bounds;
+            assert!(
+                low[0] as f64 <= at(0).x - 9.0 && high[0] as f64 >= at(9).x + 9.0,
+                "{query:?} {low:?} {high:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_state_of_another_cavity_is_refused_in_words() {
+    let volume = balls([24, 24, 24], &[vec![(DVec3::splat(12.0), 6.0)], vec![(DVec3::splat(12.0), 6.5)]]);
+    let [open, closed] = [Cavity::Open, Cavity::Closed].map(|cavity| {
+        SurfaceTracker::new(TrackingOptions {
+            volume: volume.clone(),
+            bounds: None,
+            component: Component::Largest,
+            start: None,
+            cavity,
+            params: TrackingParams::default(),
+        })
+        .unwrap()
+    });
+    for (mut one, other) in [(open.clone(), closed.clone()), (closed, open)] {
+        let failure = one.restore(&other.save());
+        assert!(matches!(failure, Err(MethodError::BadState { field: "cavity", .. })), "{failure:?}");
+    }
+}

@@ -64,10 +64,11 @@ pub use params::{ImplicitParams, IsoValue, KernelKind, Sides};
 use super::method::method;
 use super::params::Auto;
 use super::{LiveSurface, MethodError, StepReport, Times};
+use crate::math::order::median;
 use crate::math::{DAffine3, DVec3, PositionIndex, Vec3};
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::remesh::Changes;
-use crate::warning::{Warning, WarningCode};
+use crate::warning::{Place, Warning, WarningCode};
 use automatic::OffSurfaceSearch;
 use cloud::{BoxMap, MAX_POINTS, MIN_POINTS};
 use color::Coloring;
@@ -77,6 +78,7 @@ use field::Field;
 use kernel::{Kernel, KernelTable};
 use point_colors::PointColors;
 use sampling::{Samples, Sampling};
+use serde::{Deserialize, Serialize};
 use sides_trial::SidesTrial;
 use solve::{Constraints, Solution, Solver};
 
@@ -116,6 +118,17 @@ const DEFAULT_POINTS: usize = 20_000;
 /// Maximum size, in bytes, of the linear system's matrix that is kept after a solve, so that edits of the points need
 /// not rebuild it; a larger one is rebuilt when needed.
 const KEPT_BYTES: usize = 256 << 20;
+/// Rounding of the points, in their mean distance to the nearest neighbour, above which there is a warning.
+const COARSE_SHARE: f64 = 0.1;
+
+const AMBIGUOUS: &str = "inside and outside are ambiguous: walls or gaps are about as thin as the spacing of the points or \
+                         their noise; components, handles and volume may be wrong";
+const UNCLEAR: &str = "inside and outside are hardly distinguished here: a wall or gap is about as thin as the spacing of the \
+                       points or their noise, and may be bridged or broken; components, handles and volume may be wrong";
+const INWARD: &str =
+    "the normals that were given point inwards on the whole: inside and outside are exchanged; reverse them";
+const COARSE: &str = "the points are rounded to single precision, which is coarse beside their spacing so far from the origin: \
+                      give them in double precision, or move them to the origin before they are rounded";
 /// Seed of all random choices: a constant, so that equal input gives equal results.
 const SEED: u64 = 1;
 
@@ -130,6 +143,10 @@ pub struct ImplicitSurface {
     /// The distinct input points that are outliers so far away that the normalised box is without them, in world units.
     far_outliers: Vec<Vec3>,
     map: BoxMap,
+    /// The step of single precision in world space, if all points are rounded to it; else 0.
+    rounding: f64,
+    /// Whether the normals that were given point inwards.
+    has_inward_normals: bool,
     options: ImplicitOptions,
     params: ImplicitParams,
     edits: PointEdits,
@@ -146,11 +163,14 @@ pub struct ImplicitSurface {
     /// solver counts its own.
     slices: u32,
     solved: Option<Solved>,
-    /// The edits of the points at the last full solve; the linear system of that solve is revised for later edits.
-    base_edits: Option<PointEdits>,
-    /// The solver of the last full solve, possibly revised since, kept for later edits; `None` before it, during a
-    /// solve, and if its matrix is too large to keep.
+    /// The solution without edits, with the parameters of `solved`. The system of a few edits is revised from it, so that the
+    /// result depends on these edits alone; `None` before it, and where there are too many edits.
+    unedited: Option<Unedited>,
+    /// The solver of `unedited`, possibly revised since, kept for later edits; `None` before it, during a solve, and if its
+    /// matrix is too large to keep.
     solver: Option<Box<Solver>>,
+    /// Where the last finished surface separates inside and outside least clearly, if hardly.
+    unclear: Option<Vec3>,
     mesh: TriangleMesh,
     /// Counter of changes of the surface or its colours, so that callers know when to draw it again.
     version: u32,
@@ -178,14 +198,24 @@ impl Solved {
         let field = Field::new(KernelTable::new(kernel), &centres, &solution);
         Self { centres, solution, kernel, mean, field }
     }
+}
 
-    /// Returns the weights of this solution at the centres of `constraints`, and 0 at new centres, as initial values
-    /// for the solve after an edit.
-    fn weights_at(&self, constraints: &Constraints) -> Vec<f64> {
-        let known = PositionIndex::new(&self.centres);
-        let weight = |&centre: &Vec3| known.find(centre).map_or(0.0, |i| self.solution.weights[i]);
-        constraints.centres.iter().map(weight).collect()
-    }
+/// The solution of the system without edits.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Unedited {
+    solution: Solution,
+    residual: f64,
+}
+
+/// A linear system that is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+enum Solving {
+    /// That without edits.
+    Unedited,
+    /// That one, revised for the edits.
+    Revised,
+    /// That with the edits, from scratch: there are too many, or it has no solution without.
+    Edited,
 }
 
 /// The stage of the reconstruction that the next call of [`ImplicitSurface::step`] works on, with its data.
@@ -193,7 +223,7 @@ enum Stage {
     Subsample(Box<Sampling>),
     /// The choice of points off the surface; `None` before it, or without one.
     Constrain(Option<Constraining>),
-    Solve(Box<Solver>),
+    Solve(Box<Solver>, Solving),
     Extract(Box<Extraction>),
     Color(Box<ColoringState>),
     Done,
@@ -276,6 +306,8 @@ impl ImplicitSurface {
     fn from_parts(original: Vec<Vec3>, cloud: Cloud, map: BoxMap, options: ImplicitOptions) -> Self {
         Self {
             origin: cloud.origin,
+            rounding: rounding_of(&original, cloud.origin),
+            has_inward_normals: cloud.has_inward_normals(),
             original,
             cloud,
             far_outliers: Vec::new(),
@@ -291,8 +323,9 @@ impl ImplicitSurface {
             options,
             slices: 0,
             solved: None,
-            base_edits: None,
+            unedited: None,
             solver: None,
+            unclear: None,
             mesh: TriangleMesh::default(),
             version: 0,
             components: 0,
@@ -338,13 +371,13 @@ impl ImplicitSurface {
         self.stage = match stage {
             Stage::Subsample(sampling) => self.subsample(sampling)?,
             Stage::Constrain(state) => self.constrain(state)?,
-            Stage::Solve(solver) => self.solve(solver)?,
+            Stage::Solve(solver, system) => self.solve(solver, system)?,
             Stage::Extract(extraction) => self.extract(extraction)?,
             Stage::Color(state) => self.color(*state),
             Stage::Done => Stage::Done,
         };
         // The solver counts its own slices, and there are none at the end.
-        let counts = self.stage.phase() == before && !matches!(self.stage, Stage::Solve(_) | Stage::Done);
+        let counts = self.stage.phase() == before && !matches!(self.stage, Stage::Solve(..) | Stage::Done);
         self.slices = if counts { slices + 1 } else { 0 };
         Ok(())
     }
@@ -355,7 +388,11 @@ impl ImplicitSurface {
             done: matches!(self.stage, Stage::Done),
             phase: phase.into(),
             progress: self.stage.progress(self.options.cameras.len()),
-            residual: if let Stage::Solve(solver) = &self.stage { solver.residual() } else { self.residual },
+            residual: if let Stage::Solve(solver, _) = &self.stage {
+                solver.residual()
+            } else {
+                self.residual
+            },
             tolerance: self.params.tolerance,
             vertices: self.mesh.positions.len() as u32,
             triangles: self.mesh.triangles.len() as u32,
@@ -368,15 +405,27 @@ impl ImplicitSurface {
     }
 
     fn warnings(&self) -> Vec<Warning> {
-        let ambiguous = "inside and outside are ambiguous: walls or gaps are about as thin as the spacing of the points or their \
-                     noise; components, handles and volume may be wrong";
         let outliers = "a few points are so far away that the others are a small part of the box: cells are too large for the \
                         object, and there may be no surface; keep only the largest cluster of points, or remove those points";
+        // Nothing is coarse before the spacing is known.
+        let is_coarse =
+            self.spacing() > 0.0 && self.rounding * self.map.scale() > COARSE_SHARE * self.spacing();
         let found = [
             (self.has_far_outliers(), WarningCode::Outliers, outliers),
-            (self.ambiguous_sides && self.params.sides != Sides::Outside, WarningCode::ThinParts, ambiguous),
+            (self.has_inward_normals, WarningCode::InwardNormals, INWARD),
+            (is_coarse, WarningCode::Precision, COARSE),
         ];
-        found.into_iter().filter(|one| one.0).map(|(_, code, text)| Warning::new(code, text)).collect()
+        let found = found.into_iter().filter(|one| one.0).map(|(_, code, text)| Warning::new(code, text));
+        found.chain(self.thin_parts()).collect()
+    }
+
+    fn thin_parts(&self) -> Option<Warning> {
+        if self.ambiguous_sides && self.params.sides != Sides::Outside {
+            return Some(Warning::new(WarningCode::ThinParts, AMBIGUOUS));
+        }
+        let unclear = self.unclear?;
+        let place = Place::Point((unclear.as_dvec3() + self.origin).to_array());
+        Some(Warning::at(WarningCode::ThinParts, place, UNCLEAR))
     }
 
     fn has_far_outliers(&self) -> bool {
@@ -486,59 +535,115 @@ impl ImplicitSurface {
         constraints
     }
 
-    /// Starts to solve the linear system of the current constraints from scratch; returns the stage in which
-    /// [`Self::advance`] continues.
+    /// Starts to solve the linear system of the current constraints from scratch: without edits first, if it can be revised for
+    /// these. Returns the stage in which [`Self::advance`] continues.
     fn begin_solve(&mut self) -> Stage {
-        self.base_edits = Some(self.edits.clone());
-        self.solver = None;
-        Stage::Solve(self.new_solver(&self.constraints))
+        (self.unedited, self.solver) = (None, None);
+        let unedited = self.unedited_constraints().map(|constraints| self.new_solver(&constraints));
+        match unedited.filter(|solver| self.is_revisable(solver)) {
+            Some(solver) => Stage::Solve(solver, Solving::Unedited),
+            None => self.begin_edited(),
+        }
+    }
+
+    fn begin_edited(&self) -> Stage {
+        Stage::Solve(self.new_solver(&self.constraints), Solving::Edited)
     }
 
     fn new_solver(&self, constraints: &Constraints) -> Box<Solver> {
         Box::new(Solver::new(constraints, self.kernel(constraints), self.params.tolerance, SEED))
     }
 
-    /// Starts to solve the linear system of the current constraints after an edit: by revising the system of the last
-    /// full solve, or from scratch if that is impossible. Returns the stage in which [`Self::advance`] continues.
-    fn begin_revision(&mut self) -> Stage {
-        self.revised_solver().map_or_else(|| self.begin_solve(), Stage::Solve)
+    /// Returns whether a solver of the system without edits can be revised for the current constraints.
+    fn is_revisable(&self, solver: &Solver) -> bool {
+        solver.kernel() == self.kernel(&self.constraints) && solver.can_revise(&self.constraints)
     }
 
-    fn revised_solver(&mut self) -> Option<Box<Solver>> {
-        let solved = self.solved.as_ref()?;
-        let mut solver = match self.solver.take() {
-            Some(kept) => kept,
-            None => self.new_solver(&self.base_constraints()?),
-        };
-        let is_usable = solver.kernel() == self.kernel(&self.constraints)
-            && solver.revise(&self.constraints, solved.weights_at(&self.constraints));
-        is_usable.then_some(solver)
-    }
-
-    /// Returns the constraints of the last full solve, rebuilt from its edits so that its linear system can be rebuilt
-    /// and revised; `None` before the first full solve, or after it failed.
-    fn base_constraints(&self) -> Option<Constraints> {
-        let (edits, samples, exterior) =
-            (self.base_edits.as_ref()?, self.samples.as_ref()?, self.exterior.as_ref()?);
-        let constraints = edits.constraints(samples, exterior, &self.original, &self.map).ok()?;
+    /// Returns the constraints without edits; `None` before there are any.
+    fn unedited_constraints(&self) -> Option<Constraints> {
+        let (samples, exterior) = (self.samples.as_ref()?, self.exterior.as_ref()?);
+        let constraints =
+            PointEdits::default().constraints(samples, exterior, &self.original, &self.map).ok()?;
         Some(self.regularized(constraints))
     }
 
-    fn solve(&mut self, mut solver: Box<Solver>) -> Result<Stage, MethodError> {
-        let done = solver.advance().map_err(|_| self.singular())?;
-        let Some(solution) = done.then(|| solver.solution()).flatten() else {
-            return Ok(Stage::Solve(solver));
-        };
-        self.residual = solver.residual();
+    /// Starts to solve the system after an edit: `solver` is that of the solve that was under way, if there was one.
+    ///
+    /// # Errors
+    /// Those of [`Self::begin_extraction`].
+    fn begin_revision(&mut self, solver: Option<(Box<Solver>, Solving)>) -> Result<Stage, MethodError> {
+        if self.unedited.is_some() && self.edits == PointEdits::default() {
+            self.solver = solver.map(|(solver, _)| solver).or(self.solver.take());
+            self.take_unedited();
+            return self.begin_extraction();
+        }
+        match solver {
+            Some((solver, Solving::Unedited)) if self.is_revisable(&solver) => {
+                Ok(Stage::Solve(solver, Solving::Unedited))
+            }
+            Some((solver, Solving::Revised)) => Ok(self.revision(Some(solver))),
+            _ => {
+                let kept = self.solver.take();
+                Ok(self.revision(kept))
+            }
+        }
+    }
+
+    /// Starts to revise the system without edits, from its solution; where that is impossible, starts from scratch.
+    fn revision(&mut self, kept: Option<Box<Solver>>) -> Stage {
+        self.revised_solver(kept)
+            .map_or_else(|| self.begin_solve(), |solver| Stage::Solve(solver, Solving::Revised))
+    }
+
+    fn revised_solver(&self, kept: Option<Box<Solver>>) -> Option<Box<Solver>> {
+        let (Unedited { solution, .. }, constraints) =
+            (self.unedited.as_ref()?, self.unedited_constraints()?);
+        let mut solver = kept.unwrap_or_else(|| self.new_solver(&constraints));
+        let known = PositionIndex::new(&constraints.centres);
+        let weight = |&centre: &Vec3| known.find(centre).map_or(0.0, |i| solution.weights[i]);
+        let weights = self.constraints.centres.iter().map(weight).collect();
+        (self.is_revisable(&solver) && solver.revise(&self.constraints, weights)).then_some(solver)
+    }
+
+    /// Makes the solution without edits the current one; there must be one.
+    fn take_unedited(&mut self) {
+        if let Some(Unedited { solution, residual }) = self.unedited.clone() {
+            self.residual = residual;
+            self.take_solution(solution);
+        }
+    }
+
+    fn take_solution(&mut self, solution: Solution) {
         let mean = self.constraints.mean_on_surface(&solution);
-        self.solved = Some(Solved::new(solver.kernel(), self.constraints.centres.clone(), solution, mean));
-        self.solver = (solver.matrix_bytes() <= KEPT_BYTES).then_some(solver);
+        let kernel = self.kernel(&self.constraints);
+        self.solved = Some(Solved::new(kernel, self.constraints.centres.clone(), solution, mean));
+    }
+
+    fn solve(&mut self, mut solver: Box<Solver>, system: Solving) -> Result<Stage, MethodError> {
+        let has_edits = self.edits != PointEdits::default();
+        let done = match solver.advance() {
+            Err(_) if system == Solving::Unedited && has_edits => return Ok(self.begin_edited()),
+            result => result.map_err(|_| self.singular())?,
+        };
+        let Some(solution) = done.then(|| solver.solution()).flatten() else {
+            return Ok(Stage::Solve(solver, system));
+        };
+        if system == Solving::Unedited {
+            self.unedited = Some(Unedited { solution: solution.clone(), residual: solver.residual() });
+            if has_edits {
+                return Ok(self.revision(Some(solver)));
+            }
+        }
+        self.residual = solver.residual();
+        self.take_solution(solution);
+        let keeps = system != Solving::Edited && solver.matrix_bytes() <= KEPT_BYTES;
+        self.solver = keeps.then_some(solver);
         self.begin_extraction()
     }
 
-    /// Returns the error of a failed solve, and discards its linear system, so that later edits do not revise it.
+    /// Returns the error of a failed solve, and discards the system without edits, so that later edits do not revise it.
     fn singular(&mut self) -> MethodError {
-        (self.base_edits, self.solver) = (None, None);
+        (self.unedited, self.solver) = (None, None);
         let cause = if self.has_far_outliers() {
             "a few points are so far away that the others nearly coincide in the box; discard outliers with keepComponents, \
              or remove them"
@@ -577,6 +682,8 @@ impl ImplicitSurface {
     fn extract(&mut self, mut extraction: Box<Extraction>) -> Result<Stage, MethodError> {
         let Some(mesh) = extraction.advance()? else { return Ok(Stage::Extract(extraction)) };
         self.spurious_components = extraction.spurious_components();
+        let apart = 1.0 / self.in_force().density.sqrt() / self.map.scale();
+        self.unclear = extraction.unclear(&mesh, apart as f32);
         let coloring = Coloring::new(mesh.positions.len());
         Ok(Stage::Color(Box::new(ColoringState { mesh, coloring, camera: 0, points: None })))
     }
@@ -641,13 +748,13 @@ impl ImplicitSurface {
         let (now, only_extraction) = (&self.params, before.with_extraction_of(&self.params));
         if before.sides != now.sides && !matches!(self.stage, Stage::Subsample(_)) {
             // Without them, edits in the meantime wait for the new ones.
-            (self.sides, self.exterior) = (None, None);
+            (self.sides, self.exterior, self.unedited) = (None, None, None);
             (self.stage, self.slices) = (Stage::Constrain(None), 0);
         }
         if before == *now || matches!(self.stage, Stage::Subsample(_) | Stage::Constrain(_)) {
             return Ok(());
         }
-        if only_extraction == *now && !matches!(self.stage, Stage::Solve(_)) {
+        if only_extraction == *now && !matches!(self.stage, Stage::Solve(..)) {
             match self.begin_extraction() {
                 Ok(stage) => (self.stage, self.slices) = (stage, 0),
                 Err(error) => {
@@ -669,8 +776,9 @@ impl ImplicitSurface {
     }
 
     /// Replaces all edits of the input points: points added, removed and marked as outside. The last finished surface
-    /// stays until the new one is complete. If only a few constraints change, the last system is revised: its solution
-    /// is reused, and its matrix, unless that was too large to keep.
+    /// stays until the new one is complete. If only a few constraints differ from those without edits, the system of these is
+    /// revised: its solution is reused, and its matrix, unless that was too large to keep. The surface depends on `edits`, not
+    /// on those before them, nor on when they are made.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] naming the list and the bad entry, or if too few points are left, or all lie in
@@ -686,12 +794,22 @@ impl ImplicitSurface {
         }
         if let (Some(samples), Some(exterior)) = (&self.samples, &self.exterior) {
             let constraints = edits.constraints(samples, exterior, &self.original, &self.map)?;
-            self.constraints = self.regularized(constraints);
-            self.edits = edits;
-            if let Stage::Solve(solver) = std::mem::replace(&mut self.stage, Stage::Done) {
-                self.solver = Some(solver);
+            let constraints = self.regularized(constraints);
+            let before = (
+                std::mem::replace(&mut self.constraints, constraints),
+                std::mem::replace(&mut self.edits, edits),
+            );
+            let under_way = match std::mem::replace(&mut self.stage, Stage::Done) {
+                Stage::Solve(solver, system) => Some((solver, system)),
+                _ => None,
+            };
+            match self.begin_revision(under_way) {
+                Ok(stage) => (self.stage, self.slices) = (stage, 0),
+                Err(error) => {
+                    (self.constraints, self.edits) = before;
+                    return Err(error);
+                }
             }
-            (self.stage, self.slices) = (self.begin_revision(), 0);
         } else {
             self.edits = edits;
         }
@@ -759,7 +877,7 @@ impl Stage {
         match self {
             Self::Subsample(_) => "subsample",
             Self::Constrain(_) => "constraints",
-            Self::Solve(_) => "solve",
+            Self::Solve(..) => "solve",
             Self::Extract(_) => "extract",
             Self::Color(_) | Self::Done => "colour",
         }
@@ -769,12 +887,23 @@ impl Stage {
         match self {
             Self::Subsample(sampling) => sampling.progress(),
             Self::Constrain(state) => state.as_ref().map_or(0.0, Constraining::progress),
-            Self::Solve(solver) => solver.progress(),
+            Self::Solve(solver, _) => solver.progress(),
             Self::Extract(extraction) => extraction.progress(),
             Self::Color(state) => state.camera as f64 / (cameras + 1) as f64,
             Self::Done => 1.0,
         }
     }
+}
+
+/// Returns the step of single precision at most points in world space if all of them, relative to `origin`, are rounded to it,
+/// else 0.
+fn rounding_of(points: &[Vec3], origin: DVec3) -> f64 {
+    let in_world = || points.iter().map(|p| p.as_dvec3() + origin);
+    if in_world().any(|p| p.as_vec3().as_dvec3() != p) {
+        return 0.0;
+    }
+    let usual = median(in_world().map(|p| p.abs().max_element() as f32)).unwrap_or(0.0);
+    f64::from(usual.next_up() - usual)
 }
 
 /// Returns the cameras for positions relative to `origin`.

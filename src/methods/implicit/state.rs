@@ -6,7 +6,10 @@
 
 use super::kernel::Kernel;
 use super::solve::{Solution, SolverPosition};
-use super::{ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits, Sides, Solved, Stage};
+use super::{
+    ImplicitParams, ImplicitSurface, IsoValue, KernelKind, PointEdits, Sides, Solved, Solving, Stage,
+    Unedited,
+};
 use crate::math::{DVec3, Vec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
@@ -14,7 +17,9 @@ use crate::methods::params::Auto;
 use crate::methods::saved::{Hash, Magic, decode, encode};
 use serde::{Deserialize, Serialize};
 
-const MAGIC: Magic = *b"VSCLIMP\x03";
+const MAGIC: Magic = *b"VSCLIMP\x04";
+/// States from when edits revised the last system.
+const MAGIC_WITH_BASE: Magic = *b"VSCLIMP\x03";
 /// States before there were `sides`.
 const MAGIC_WITHOUT_SIDES: Magic = *b"VSCLIMP\x02";
 
@@ -23,7 +28,18 @@ const MAGIC_WITHOUT_SIDES: Magic = *b"VSCLIMP\x02";
 enum SavedStage {
     Subsample,
     Constrain,
-    /// A solve: the position of the solver, and whether it revises the system of the last full solve.
+    /// A solve: the position of the solver, and its system.
+    Solve(SolverPosition, Solving),
+    Extract,
+    Color,
+    Done,
+}
+
+/// A stage of a state from when edits revised the last system: a solve tells whether it did so.
+#[derive(Clone, Copy, Deserialize)]
+enum StageWithBase {
+    Subsample,
+    Constrain,
     Solve(SolverPosition, bool),
     Extract,
     Color,
@@ -32,7 +48,7 @@ enum SavedStage {
 
 /// The saved form of an [`ImplicitSurface`], with its parameters and edits, but without its points and other options.
 #[derive(Serialize, Deserialize)]
-struct State<Params = ImplicitParams> {
+struct State<Params = ImplicitParams, Rest = self::Rest> {
     fingerprint: u64,
     params: Params,
     rest: Rest,
@@ -42,8 +58,33 @@ struct State<Params = ImplicitParams> {
 #[derive(Serialize, Deserialize)]
 struct Rest {
     edits: PointEdits,
-    base: Option<PointEdits>,
+    unedited: SavedUnedited,
     saved_stage: SavedStage,
+    slices: u32,
+    iteration: u32,
+    residual: f64,
+    spurious_components: u32,
+    unclear: Option<Vec3>,
+    solved: Option<Function>,
+    surface: Surface,
+}
+
+/// The saved form of the solution without edits.
+#[derive(Serialize, Deserialize)]
+enum SavedUnedited {
+    None,
+    /// It is the last solution.
+    Last,
+    Other(Unedited),
+}
+
+/// The rest of a [`State`] from when edits revised the last system.
+#[derive(Deserialize)]
+struct RestWithBase {
+    edits: PointEdits,
+    #[expect(dead_code, reason = "read for its length")]
+    base: Option<PointEdits>,
+    saved_stage: StageWithBase,
     slices: u32,
     iteration: u32,
     residual: f64,
@@ -52,13 +93,47 @@ struct Rest {
     surface: Surface,
 }
 
+impl From<RestWithBase> for Rest {
+    /// The solution without edits is found again for the next edit. A revision that was under way begins from scratch.
+    fn from(rest: RestWithBase) -> Self {
+        let system = if rest.edits == PointEdits::default() { Solving::Unedited } else { Solving::Edited };
+        let saved_stage = match rest.saved_stage {
+            StageWithBase::Subsample => SavedStage::Subsample,
+            StageWithBase::Constrain => SavedStage::Constrain,
+            StageWithBase::Solve(_, true) => SavedStage::Solve(SolverPosition::default(), system),
+            StageWithBase::Solve(position, false) => SavedStage::Solve(position, system),
+            StageWithBase::Extract => SavedStage::Extract,
+            StageWithBase::Color => SavedStage::Color,
+            StageWithBase::Done => SavedStage::Done,
+        };
+        Self {
+            edits: rest.edits,
+            unedited: SavedUnedited::None,
+            saved_stage,
+            slices: rest.slices,
+            iteration: rest.iteration,
+            residual: rest.residual,
+            spurious_components: rest.spurious_components,
+            unclear: None,
+            solved: rest.solved,
+            surface: rest.surface,
+        }
+    }
+}
+
+impl From<State<ImplicitParams, RestWithBase>> for State {
+    fn from(state: State<ImplicitParams, RestWithBase>) -> Self {
+        Self { fingerprint: state.fingerprint, params: state.params, rest: state.rest.into() }
+    }
+}
+
 /// The parameters of a state from before there were `sides`, in the order of that time.
 #[derive(Deserialize)]
 struct ParamsWithoutSides(KernelKind, Auto, f64, f64, Auto, Auto, f64, f64, IsoValue);
 
-impl From<State<ParamsWithoutSides>> for State {
+impl From<State<ParamsWithoutSides, RestWithBase>> for State {
     /// There were constraints on both sides if λ of those outside was `auto`.
-    fn from(state: State<ParamsWithoutSides>) -> Self {
+    fn from(state: State<ParamsWithoutSides, RestWithBase>) -> Self {
         let ParamsWithoutSides(kernel, delta, tau, sigma, lambda_surface, lambda_exterior, ..) = state.params;
         let ParamsWithoutSides(.., tolerance, cell, level) = state.params;
         let sides = if lambda_exterior == Auto::Auto { Sides::Both } else { Sides::Outside };
@@ -76,7 +151,7 @@ impl From<State<ParamsWithoutSides>> for State {
                 sides,
             },
             fingerprint: state.fingerprint,
-            rest: state.rest,
+            rest: state.rest.into(),
         }
     }
 }
@@ -111,12 +186,13 @@ impl ImplicitSurface {
                 params: self.params.clone(),
                 rest: Rest {
                     edits: self.edits.clone(),
-                    base: self.base_edits.clone(),
+                    unedited: self.saved_unedited(),
                     saved_stage: self.stage.reached(),
                     slices: self.slices,
                     iteration: self.iteration,
                     residual: self.residual,
                     spurious_components: self.spurious_components as u32,
+                    unclear: self.unclear,
                     solved: self.solved.as_ref().map(|solved| Function {
                         kernel: solved.kernel,
                         centres: solved.centres.clone(),
@@ -134,6 +210,18 @@ impl ImplicitSurface {
         )
     }
 
+    /// Returns the solution without edits to be saved, unless it is the last one, which is saved anyway.
+    fn saved_unedited(&self) -> SavedUnedited {
+        let is_last = self.edits == PointEdits::default() && !matches!(self.stage, Stage::Solve(..));
+        match &self.unedited {
+            // After an error the run may begin again; its constraints are not known in a restored one.
+            _ if matches!(self.stage, Stage::Subsample(_) | Stage::Constrain(_)) => SavedUnedited::None,
+            Some(_) if is_last => SavedUnedited::Last,
+            Some(unedited) => SavedUnedited::Other(unedited.clone()),
+            None => SavedUnedited::None,
+        }
+    }
+
     /// Restores a run from the bytes of [`Self::save`]; `self` must be made from the same points and options, except
     /// parameters. Takes as long as the run had spent on choosing constraints and on its current stage; if it was
     /// colouring, on the extraction, too; if it was revising a system, on that system's matrix, too.
@@ -142,7 +230,9 @@ impl ImplicitSurface {
     /// [`MethodError::BadState`] if the bytes are not such a state; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
         let state = if bytes.starts_with(&MAGIC_WITHOUT_SIDES) {
-            decode::<State<ParamsWithoutSides>>(&MAGIC_WITHOUT_SIDES, bytes)?.into()
+            decode::<State<ParamsWithoutSides, RestWithBase>>(&MAGIC_WITHOUT_SIDES, bytes)?.into()
+        } else if bytes.starts_with(&MAGIC_WITH_BASE) {
+            decode::<State<ImplicitParams, RestWithBase>>(&MAGIC_WITH_BASE, bytes)?.into()
         } else {
             decode::<State>(&MAGIC, bytes)?
         };
@@ -166,11 +256,17 @@ impl ImplicitSurface {
         if rest.saved_stage.needs_solution() && rest.solved.is_none() {
             return bad("solution", "missing");
         }
-        for edits in std::iter::once(&rest.edits).chain(&rest.base) {
-            edits.validate(&self.original, &self.map)?;
-        }
+        rest.edits.validate(&self.original, &self.map)?;
         let mut next = self.restarted();
-        (next.params, next.edits, next.base_edits) = (state.params, rest.edits, rest.base);
+        (next.params, next.edits) = (state.params, rest.edits);
+        let last = rest.solved.as_ref().map(|function| &function.solution);
+        next.unedited = match (rest.unedited, last) {
+            (SavedUnedited::Other(unedited), _) => Some(unedited),
+            (SavedUnedited::Last, Some(solution)) => {
+                Some(Unedited { solution: solution.clone(), residual: rest.residual })
+            }
+            _ => None,
+        };
         if let Some(Function { kernel, centres, solution, mean }) = rest.solved {
             if solution.weights.len() != centres.len() || solution.coefficients.len() != kernel.polynomials()
             {
@@ -179,6 +275,10 @@ impl ImplicitSurface {
             next.solved = Some(Solved::new(kernel, centres, solution, mean));
         }
         next.replay(rest.saved_stage, rest.slices)?;
+        if !next.fits_unedited() {
+            return bad("unedited", "inconsistent");
+        }
+        next.unclear = rest.unclear;
         next.spurious_components = rest.spurious_components as usize;
         next.iteration = rest.iteration;
         next.residual = rest.residual;
@@ -186,6 +286,15 @@ impl ImplicitSurface {
         next.take_mesh(mesh);
         *self = next;
         Ok(())
+    }
+
+    /// Returns whether the solution without edits, if there is one, has the numbers of weights and coefficients of its system.
+    fn fits_unedited(&self) -> bool {
+        let Some(Unedited { solution, .. }) = &self.unedited else { return true };
+        self.unedited_constraints().is_some_and(|constraints| {
+            let numbers = (constraints.centres.len(), self.kernel(&constraints).polynomials());
+            numbers == (solution.weights.len(), solution.coefficients.len())
+        })
     }
 
     /// Returns a hash of the input points and of all options but the parameters; [`Self::restore`] rejects a state with
@@ -233,11 +342,18 @@ impl ImplicitSurface {
             }
         }
         self.stage = match saved_stage {
-            SavedStage::Solve(position, revised) => {
-                let mut solver = if revised { self.revised_solver() } else { None }
-                    .unwrap_or_else(|| self.new_solver(&self.constraints));
+            SavedStage::Solve(position, system) => {
+                let solver = match system {
+                    Solving::Unedited => self.unedited_constraints().map(|all| self.new_solver(&all)),
+                    Solving::Revised => self.revised_solver(None),
+                    Solving::Edited => Some(self.new_solver(&self.constraints)),
+                };
+                let Some(mut solver) = solver else {
+                    let problem = "does not belong to its solution".into();
+                    return Err(MethodError::BadState { field: "stage", problem });
+                };
                 solver.advance_to(position).map_err(|_| self.singular())?;
-                Stage::Solve(solver)
+                Stage::Solve(solver, system)
             }
             SavedStage::Extract | SavedStage::Color => self.begin_extraction()?,
             SavedStage::Done => Stage::Done,
@@ -267,7 +383,7 @@ impl ImplicitSurface {
 
 impl SavedStage {
     fn needs_solution(self) -> bool {
-        matches!(self, Self::Extract | Self::Color | Self::Done | Self::Solve(_, true))
+        matches!(self, Self::Extract | Self::Color | Self::Done)
     }
 }
 
@@ -276,7 +392,7 @@ impl Stage {
         match self {
             Self::Subsample(_) => SavedStage::Subsample,
             Self::Constrain(_) => SavedStage::Constrain,
-            Self::Solve(solver) => SavedStage::Solve(solver.position(), solver.is_revised()),
+            Self::Solve(solver, system) => SavedStage::Solve(solver.position(), *system),
             Self::Extract(_) => SavedStage::Extract,
             Self::Color(_) => SavedStage::Color,
             Self::Done => SavedStage::Done,

@@ -43,8 +43,9 @@ const LEAST_BLOCKED: usize = 20;
 /// Length of a step of the smallest handles, as a share of their largest reach: nothing has to follow them from outside.
 const STEP: f64 = 0.15;
 
-/// Largest number of times that the step of the handles is halved where the surface cannot follow, before they stop.
-const MOST_HALVINGS: u32 = 2;
+/// Largest number of times that the step of the handles is halved where the surface cannot follow, before they stop: within a
+/// hundredth of the largest step of where they have to. With few, a far target stopped them where a near one did not.
+const MOST_HALVINGS: u32 = 6;
 
 /// Largest distance of the middle of an edge from the given surface by rounding, as a share of the edge.
 const ON_SURFACE: f64 = 1e-5;
@@ -166,8 +167,8 @@ impl Held {
     /// Returns what is to be known about the surface.
     pub fn warnings(&self) -> Vec<Warning> {
         let stopped = self.has_stopped.then(|| {
-            let what = "An ellipsoid stopped before its target: the surface around it would have folded up. Move it by less, \
-                        use a smaller one, or move others along with it.";
+            let what = "An ellipsoid stopped before its target: the surface around it would have folded up. It moved as far as it \
+                        goes this way: use a smaller one, or one further from others.";
             Warning::new(WarningCode::HandleStopped, what)
         });
         self.crossings.warning().into_iter().chain(stopped).collect()

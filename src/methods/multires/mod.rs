@@ -51,6 +51,7 @@ use crate::math::{DVec3, triangle};
 use crate::mesh::{Mesh, TriangleMesh, VertexId, measure};
 use crate::pauses::{Pauses, finished};
 use crate::remesh::{Changes, Embedding, restructure_in_slices};
+use crate::warning::{Warning, WarningCode};
 use containment::contains_centres;
 use correspondence::{Correspondence, Current, folded, project};
 use detail::{Bands, DetailSampling, Detailed, detailed, detailed_in_slices};
@@ -59,7 +60,7 @@ use held::{Held, Placed};
 use membrane::{pushed_positions, solve_with};
 use motion::MovingEllipsoids;
 use proposal::proposed;
-use setup::{cannot_hold_itself, check_size, identity, set_up, set_up_surface};
+use setup::{cannot_hold_itself, check_size, has_no_inside, identity, set_up, set_up_surface};
 use space::ModelSpace;
 use topology::displacements_to;
 
@@ -113,6 +114,8 @@ pub struct MultiresolutionModel {
     /// between frames, not its state.
     guard: Embedding,
     components: u32,
+    /// The number of components of the detail that a membrane is to keep; `None` for others.
+    detail_components: Option<u32>,
     iteration: u32,
     /// Number of frames in a row that refreshed the membrane on the finest level only, 0 after a solve on all levels;
     /// at least 1 if such a solve is due once the ellipsoids stop.
@@ -166,6 +169,7 @@ impl MultiresolutionModel {
         }
         let MultiresOptions { detail, base, ellipsoids: given, params, .. } = options;
         check_ellipsoids(&given)?;
+        let has_detail = detail.is_some();
         let space = ModelSpace::of(detail.as_ref().or(base.as_ref()), &given);
         let [detail, base] = [detail, base].map(|mesh| mesh.map(|mesh| space.mesh(mesh)));
         let moving = MovingEllipsoids::new(&space.ellipsoids(&given));
@@ -174,7 +178,9 @@ impl MultiresolutionModel {
         let (bands, params) = set_up(detail, base, &ellipsoids, space.params(&params), pauses).await?;
         let bands = Bands::new(bands, pauses).await;
         let surface = Mesh::from_triangles(bands.base().walker.mesh())?;
-        Self::from_parts(space, bands, moving, params, surface, pauses).await
+        let finest = has_detail.then(|| measure(bands.finest().walker.mesh()).components as u32);
+        let model = Self::from_parts(space, bands, moving, params, surface, pauses).await?;
+        Ok(Self { detail_components: finest, ..model })
     }
 
     async fn from_parts(
@@ -208,6 +214,7 @@ impl MultiresolutionModel {
             params: space.params_in_world(&params),
             space,
             components: 0,
+            detail_components: None,
             bands,
             ellipsoids: moving,
             model_params: params,
@@ -242,7 +249,9 @@ impl MultiresolutionModel {
         let mut ellipsoids = space.ellipsoids(&given);
         if ellipsoids.is_empty() {
             ellipsoids = proposed(&surface, pauses).await;
-            check_ellipsoids(&ellipsoids)?;
+            if ellipsoids.is_empty() {
+                return Err(has_no_inside(&surface));
+            }
         }
         let held = Held::in_slices(&surface, &ellipsoids, params.edge_max, pauses).await?;
         pauses.now().await;
@@ -262,6 +271,7 @@ impl MultiresolutionModel {
             params: space.params_in_world(&params),
             space,
             components,
+            detail_components: None,
             bands: Bands::new(vec![surface], pauses).await,
             ellipsoids: MovingEllipsoids::new(&ellipsoids),
             model_params: params,
@@ -504,8 +514,23 @@ impl MultiresolutionModel {
             euler: mesh.euler() as i32,
             events,
             times,
-            warnings: self.held.as_ref().map(Held::warnings).unwrap_or_default(),
+            warnings: self.warnings(),
         }
+    }
+
+    fn warnings(&self) -> Vec<Warning> {
+        if let Some(held) = &self.held {
+            return held.warnings();
+        }
+        let apart = self.detail_components.filter(|&all| self.components > all).map(|all| {
+            let text = format!(
+                "The surface has come apart: it has {} parts, and the detail {all}. Where no ellipsoid is inside, nothing holds \
+                 a membrane: place ellipsoids along all of it, near enough to overlap, or use support \"surface\".",
+                self.components
+            );
+            Warning::new(WarningCode::Parts, text)
+        });
+        apart.into_iter().collect()
     }
 }
 

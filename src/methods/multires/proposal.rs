@@ -28,17 +28,19 @@ pub(super) async fn proposed(surface: &Band, pauses: &Pauses) -> Vec<ControlElli
     let diagonal = f64::from(bounds.min.distance(bounds.max));
     let apart = APART * diagonal;
     let mut balls: Vec<Ball> = Vec::new();
-    for at in places(surface) {
+    let component = surface.walker.mesh().component_of_each_vertex();
+    for (t, at) in places(surface) {
         // Closest points are hard to tell in the middle of a sphere: one of its balls is enough.
         if !balls.iter().any(|ball| ball.touches(at[0])) {
-            balls.extend(inner_ball(surface, at, diagonal));
+            let component = component[surface.walker.mesh().triangles[t][0] as usize];
+            balls.extend(inner_ball(surface, at, diagonal).map(|ball| Ball { component, ..ball }));
             pauses.after(STEPS).await;
         }
     }
     let largest = balls.iter().map(|ball| ball.radius).fold(0.0, f64::max);
     let least = (LEAST[0] * largest).min(LEAST[1] * diagonal);
     balls.retain(|ball| ball.radius >= least);
-    let mut chosen: Vec<Ball> = Vec::new();
+    let mut chosen = largest_of_each(&balls);
     while chosen.len() < MOST {
         let best = balls.iter().filter_map(|ball| Some((ball.merit(&chosen, apart)?, ball)));
         // Of equal ones the first, on every machine.
@@ -50,22 +52,48 @@ pub(super) async fn proposed(surface: &Band, pauses: &Pauses) -> Vec<ControlElli
     chosen.iter().map(Ball::ellipsoid).collect()
 }
 
+/// Returns the largest ball of each component, or of the [`MOST`] components with the largest: what has none cannot be moved.
+fn largest_of_each(balls: &[Ball]) -> Vec<Ball> {
+    let mut chosen: Vec<Ball> = Vec::new();
+    for ball in balls {
+        match chosen.iter_mut().find(|other| other.component == ball.component) {
+            Some(other) if other.radius < ball.radius => *other = *ball,
+            Some(_) => {}
+            None => chosen.push(*ball),
+        }
+    }
+    chosen.sort_by(|a, b| b.radius.total_cmp(&a.radius));
+    // The walls of a cavity are two components around one body.
+    let mut apart: Vec<Ball> = Vec::new();
+    for ball in chosen {
+        if apart.len() < MOST && apart.iter().all(|other| other.gap(&ball) > 0.0) {
+            apart.push(ball);
+        }
+    }
+    apart
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Ball {
     center: DVec3,
     radius: f64,
+    /// The component of the surface that it touches.
+    component: u32,
 }
 
 impl Ball {
     /// Returns how much this ball adds to others: the larger and the further from them, the more; `None` if it is not
     /// `apart` from them.
     fn merit(&self, others: &[Self], apart: f64) -> Option<f64> {
-        let gap = |other: &Self| other.center.distance(self.center) - other.radius - self.radius;
-        let gap = others.iter().map(gap).fold(f64::INFINITY, f64::min);
+        let gap = others.iter().map(|other| self.gap(other)).fold(f64::INFINITY, f64::min);
         if gap < apart {
             return None;
         }
         Some(if others.is_empty() { self.radius } else { self.radius * gap })
+    }
+
+    fn gap(&self, other: &Self) -> f64 {
+        other.center.distance(self.center) - other.radius - self.radius
     }
 
     /// Returns whether a point of the surface is where this ball touches it, or nearly.
@@ -82,8 +110,8 @@ impl Ball {
     }
 }
 
-/// Returns points of the surface, spread evenly over its area, with its normals there.
-fn places(surface: &Band) -> impl Iterator<Item = [Vec3; 2]> {
+/// Returns points of the surface, spread evenly over its area, with its normals there, each with its triangle.
+fn places(surface: &Band) -> impl Iterator<Item = (usize, [Vec3; 2])> {
     let corners = |t: usize| surface.walker.corners(t as u32);
     let count = surface.walker.mesh().triangles.len();
     let area: f64 = (0..count).map(|t| triangle::area(corners(t))).sum();
@@ -93,7 +121,7 @@ fn places(surface: &Band) -> impl Iterator<Item = [Vec3; 2]> {
         let before = passed;
         passed += triangle::area([a, b, c]) * PLACES as f64 / area;
         let normal = (b - a).cross(c - a).normalize_or_zero();
-        (before.floor() < passed.floor() && normal != Vec3::ZERO).then(|| [(a + b + c) / 3.0, normal])
+        (before.floor() < passed.floor() && normal != Vec3::ZERO).then(|| (t, [(a + b + c) / 3.0, normal]))
     })
 }
 
@@ -103,7 +131,7 @@ fn inner_ball(surface: &Band, [at, normal]: [Vec3; 2], diagonal: f64) -> Option<
     let (p, inwards) = (at.as_dvec3(), -normal.as_dvec3());
     let lifted = (p + inwards * (1e-5 * diagonal)).as_vec3();
     let across = surface.walker.tree().ray_hit(lifted, -normal)?;
-    let mut ball = Ball { center: p, radius: 0.5 * across.distance };
+    let mut ball = Ball { center: p, radius: 0.5 * across.distance, component: 0 };
     for _ in 0..STEPS {
         ball.center = p + inwards * ball.radius;
         let nearest = surface.walker.closest(ball.center.as_vec3())?;

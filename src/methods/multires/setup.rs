@@ -98,6 +98,16 @@ pub(super) fn cannot_hold_itself(has_base: bool) -> MethodError {
     MethodError::invalid("support", problem)
 }
 
+/// The error for a surface in which no ball fits that could be proposed.
+pub(super) fn has_no_inside(surface: &Band) -> MethodError {
+    let problem = if measure(surface.walker.mesh()).volume < 0.0 {
+        "is inside out: its triangles are clockwise as seen from outside; exchange two corners of each"
+    } else {
+        "no ball that could be proposed fits inside: give ellipsoids"
+    };
+    MethodError::invalid("detail", problem)
+}
+
 /// Returns a mesh with vertices at the same position merged, see [`TriangleMesh::welded`], after checking that it is
 /// closed and manifold, and its edges not too short.
 ///

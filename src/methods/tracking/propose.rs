@@ -93,7 +93,7 @@ impl SurfaceTracker {
         };
         let levels = Levels::around(&sequence, voxel, frame, &pauses).await;
         let levels = levels.ok_or_else(|| no_object(query))?;
-        let found = Found::followed(&sequence, voxel, frame, &levels, &pauses).await;
+        let found = Found::searched(&sequence, voxel, frame, &levels, &pauses).await;
         let found = found.ok_or_else(|| no_object(query))?;
         if found.ends_of_image(&sequence) >= LEAK {
             return Err(everywhere(query));
@@ -261,18 +261,38 @@ struct Found {
     outside: f64,
     /// The step between the two kinds of what is dark in the box around the object.
     step_around: f64,
+    /// Whether it moves out of the window.
+    leaves: bool,
 }
 
 impl Found {
-    /// Follows the object around a voxel of a frame through all others; `None` if there is none.
-    async fn followed(
+    /// Follows the object around a voxel of a frame through all others, in a window that grows while it moves out of it;
+    /// `None` if there is none.
+    async fn searched(
         sequence: &CoarseSequence,
         voxel: usize,
         frame: usize,
         levels: &Levels,
         pauses: &Pauses,
     ) -> Option<Self> {
-        let window = Window::around(sequence, voxel, WINDOW * levels.ball);
+        let mut reach = WINDOW * levels.ball;
+        loop {
+            let window = Window::around(sequence, voxel, reach);
+            let found = Self::followed(sequence, window, [voxel, frame], levels, pauses).await;
+            match found {
+                Some(found) if found.leaves => reach *= 2.0,
+                found => return found,
+            }
+        }
+    }
+
+    async fn followed(
+        sequence: &CoarseSequence,
+        window: Window,
+        [voxel, frame]: [usize; 2],
+        levels: &Levels,
+        pauses: &Pauses,
+    ) -> Option<Self> {
         let frames = sequence.frames.len();
         let bright = window.bright(sequence, frame, levels.level, pauses).await;
         let (organ, mask) =
@@ -299,8 +319,9 @@ impl Found {
         let ends = window.lattice.bounds(&union)?;
         let [inside, outside] = sums.means()?;
         let step_around = window.step_around(sequence, &masks, ends, levels.level, pauses).await;
+        let leaves = window.is_left(sequence, &masks, frame);
         let ends = ends.map(|at| window.in_sequence(at));
-        Some(Self { frame: first, middle, ends, inside, outside, step_around })
+        Some(Self { frame: first, middle, ends, inside, outside, step_around, leaves })
     }
 
     /// Returns the number of ends of the image that the object reaches, along axes with more than one voxel.
@@ -386,6 +407,23 @@ impl Window {
         let first = [0, 1, 2].map(|k| middle[k].saturating_sub(voxels(k)));
         let last = [0, 1, 2].map(|k| middle[k].saturating_add(voxels(k)).min(dims[k] - 1));
         Self { lattice: Lattice { dims: [0, 1, 2].map(|k| last[k] - first[k] + 1), spacing }, first }
+    }
+
+    /// Whether the object reaches a side of the window that it does not reach in frame `first`, and beyond which the sequence
+    /// goes on: it moves out of the window. Where it reaches the side in that frame, it goes on into its surroundings.
+    fn is_left(&self, sequence: &CoarseSequence, masks: &[Option<Vec<bool>>], first: usize) -> bool {
+        let reached = |mask: &Option<Vec<bool>>| {
+            let ends = mask.as_ref().and_then(|mask| self.lattice.bounds(mask));
+            [0, 1, 2].map(|k| {
+                let (n, from) = (self.lattice.dims[k], self.first[k]);
+                let goes_on = [from > 0, from + n < sequence.lattice.dims[k]];
+                ends.map_or([false; 2], |[low, high]| {
+                    [low[k] == 0 && goes_on[0], high[k] + 1 == n && goes_on[1]]
+                })
+            })
+        };
+        let before = reached(&masks[first]);
+        masks.iter().map(reached).any(|now| (0..3).any(|k| (0..2).any(|end| now[k][end] && !before[k][end])))
     }
 
     fn in_sequence(&self, at: [usize; 3]) -> [usize; 3] {

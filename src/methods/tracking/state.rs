@@ -67,6 +67,14 @@ impl SurfaceTracker {
     /// # Errors
     /// [`MethodError::BadState`] for any other bytes; the run is then unchanged.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), MethodError> {
+        let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
+        let is_closed = bytes.starts_with(&MAGIC_CLOSED);
+        let is_open = bytes.starts_with(&MAGIC) || bytes.starts_with(&MAGIC_WITH_LOST);
+        match self.cavity {
+            Cavity::Closed if is_open => return bad("cavity", "saved with \"open\""),
+            Cavity::Open if is_closed => return bad("cavity", "saved with \"closed\""),
+            _ => {}
+        }
         let (mut state, lost, filled): (State, Vec<u32>, Vec<Vec<Filled>>) = match self.cavity {
             Cavity::Closed => decode(&MAGIC_CLOSED, bytes)?,
             Cavity::Open if bytes.starts_with(&MAGIC_WITH_LOST) => {
@@ -75,7 +83,6 @@ impl SurfaceTracker {
             }
             Cavity::Open => (decode(&MAGIC, bytes)?, Vec::new(), Vec::new()),
         };
-        let bad = |field, problem: &str| Err(MethodError::BadState { field, problem: problem.into() });
         if state.fingerprint != self.fingerprint {
             return bad("volume", "the state belongs to another volume, box, component, cavity or start");
         }

@@ -1,9 +1,12 @@
 //! Warnings about a tracked sequence: frames in which the object ends or begins, and those in which its
 //! surface is uncertain.
 
+use super::lattice::Lattice;
+use super::presence::inside_voxels;
 use super::region::Region;
 use super::{Cavity, SurfaceTracker};
 use crate::mesh::{TriangleMesh, measure};
+use crate::pauses::{Pauses, finished};
 use crate::warning::{Place, Warning, WarningCode};
 
 /// Largest accepted difference between the middles of the intensity steps at the surface in two frames of the same windows,
@@ -29,6 +32,13 @@ const WITHOUT_BOUNDARY: f64 = 0.3;
 /// eight frames it is 1.8.
 const JUMP: f64 = 2.0;
 
+/// Share of the bright voxels within a surface from which a part of them that is apart counts: smaller ones are fragments or noise.
+const PART: f64 = 0.1;
+
+/// Level from which voxels within a surface are bright, as a share of the intensity step at the surface: those of a neck, which
+/// are partly dark, connect its ends.
+const BRIGHT: f64 = 0.3;
+
 /// Facts for warnings about the surface in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct SurfaceFacts {
@@ -36,6 +46,8 @@ pub(super) struct SurfaceFacts {
     genus: u32,
     /// Whether a side of the box cuts the object.
     is_cut: bool,
+    /// Whether the object within the surface has more parts than the surface.
+    is_divided: bool,
 }
 
 impl SurfaceTracker {
@@ -63,7 +75,8 @@ impl SurfaceTracker {
         warnings.extend(self.cycle_warning());
         warnings.extend(self.missing_boundary());
         warnings.extend(self.warning_of_frames(|facts| facts.is_cut, cut_by_box));
-        let with_handles = |frames| has_handles(frames, self.cavity);
+        warnings.extend(self.warning_of_frames(|facts| facts.is_divided, divided));
+        let with_handles = |frames| has_handles(frames, self.cavity, self.is_ring());
         warnings.extend(self.warning_of_frames(|facts| facts.genus > 0, with_handles));
         warnings
     }
@@ -126,7 +139,33 @@ impl SurfaceTracker {
             self.region.is_near_side(at, NEAR_SIDE)
         });
         let share = in_side.count() as f64 / mesh.positions.len() as f64;
-        SurfaceFacts { genus: genus.max(0) as u32, is_cut: share >= CUT }
+        let is_divided = self.parts_within(frame, mesh) > measured.components;
+        SurfaceFacts { genus: genus.max(0) as u32, is_cut: share >= CUT, is_divided }
+    }
+
+    /// Returns the number of parts of the bright voxels within a surface of a frame.
+    fn parts_within(&self, frame: usize, mesh: &TriangleMesh) -> usize {
+        let Some([bright, dark]) = self.intensities_at_surface[frame] else { return 0 };
+        let (region, level) = (&self.region, dark + BRIGHT * (bright - dark));
+        let mut mesh = mesh.clone();
+        mesh.positions.iter_mut().for_each(|p| *p *= region.space.scale as f32);
+        let inside = inside_voxels(region, &mesh);
+        let image = region.frames[frame].iter().enumerate();
+        let mask: Vec<bool> =
+            image.map(|(i, &value)| inside.contains(i) && f64::from(value) > level).collect();
+        let lattice = Lattice { dims: region.dims, spacing: region.spacing.to_array() };
+        let (parts, count) = finished(lattice.parts(&mask, &Pauses::default()));
+        let mut sizes = vec![0usize; count + 1];
+        parts.iter().filter(|part| **part > 0).for_each(|&part| sizes[part as usize] += 1);
+        let all: usize = sizes.iter().sum();
+        sizes.iter().filter(|&&size| size as f64 > PART * all as f64).count()
+    }
+
+    /// Whether the surface has as many handles in all frames so far, as an object that is a ring.
+    fn is_ring(&self) -> bool {
+        let genus = |facts: &SurfaceFacts| facts.genus;
+        self.facts.first().map(genus) > Some(0)
+            && self.facts.iter().all(|facts| facts.genus == self.facts[0].genus)
     }
 
     fn has_object(&self, frame: usize) -> bool {
@@ -209,7 +248,20 @@ fn cut_by_box(frames: usize) -> (WarningCode, String) {
     (WarningCode::TouchesBox, text)
 }
 
-fn has_handles(frames: usize, cavity: Cavity) -> (WarningCode, String) {
+fn divided(frames: usize) -> (WarningCode, String) {
+    let text = format!(
+        "the object is in several parts within one surface in {frames} frames, from this one on: it has divided, or another \
+         touched it before; volume and area hold what joins the parts: track them one by one, each from where it is alone"
+    );
+    (WarningCode::Parts, text)
+}
+
+fn has_handles(frames: usize, cavity: Cavity, is_ring: bool) -> (WarningCode, String) {
+    if is_ring {
+        let text = "the surface has the same number of handles in all frames: that is right for a ring, but else noise, or \
+                    muscles that cross the object";
+        return (WarningCode::Handles, text.into());
+    }
     let close = if cavity == Cavity::Open { "close its cavity, " } else { "" };
     let text = format!(
         "the surface has handles in {frames} frames, from this one on: muscles that cross the object, or noise; {close}raise \
@@ -219,13 +271,14 @@ fn has_handles(frames: usize, cavity: Cavity) -> (WarningCode, String) {
 }
 
 fn ends(frame: usize) -> Warning {
-    let text = "the surface ends: the image has no boundary of the object here; it is gone, too small, or has moved too far";
+    let text = "the surface ends: the image has no boundary of the object here; it is gone, too small, has moved too far, or has \
+                divided";
     Warning::at(WarningCode::EndsInFrame, Place::Frame(frame as u32), text)
 }
 
 fn begins_anew(frame: usize) -> Warning {
-    let text = "a surface begins in place of the one before: the object has moved further than the windows reach, or it is \
-                another; vertices do not correspond to those in the frames before";
+    let text = "a surface begins in place of the one before: the object has moved further than the windows reach, has \
+                divided, or is another; vertices do not correspond to those in the frames before";
     Warning::at(WarningCode::BeginsInFrame, Place::Frame(frame as u32), text)
 }
 

@@ -34,7 +34,7 @@ use surface::Surface;
 
 /// Largest number of lattice nodes along an axis: the table of blocks of a cubic lattice of this size takes 68 MB, and
 /// of one twice as wide more than half a gigabyte.
-const MAX_NODES: usize = 2048;
+pub const MAX_NODES: usize = 2048;
 /// Largest distance of the lattice from the world's origin, in edge lengths of its cells: there, rounding to `f32`
 /// moves a vertex by 1/2048 of an edge at most, and vertices keep 1/256 of an edge away from nodes. Much further away,
 /// vertices coincide.

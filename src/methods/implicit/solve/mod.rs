@@ -104,7 +104,7 @@ impl Solver {
     /// these and the weights, not on constraints in between. Returns false, and does nothing, if too many constraints
     /// differ.
     pub fn revise(&mut self, constraints: &Constraints, weights: Vec<f64>) -> bool {
-        if !self.system.can_revise(constraints) {
+        if !self.can_revise(constraints) {
             return false;
         }
         self.revision = Some((constraints.clone(), weights));
@@ -112,6 +112,11 @@ impl Solver {
         (self.slices, self.iterations, self.rounds) = (0, 0, 0);
         (self.residual, self.previous_residual) = (1.0, f64::INFINITY);
         true
+    }
+
+    /// Returns whether few enough of `constraints` differ from those given to [`Self::new`] for [`Self::revise`].
+    pub fn can_revise(&self, constraints: &Constraints) -> bool {
+        self.system.can_revise(constraints)
     }
 
     /// Continues the solve by one slice, about ten milliseconds of work. Returns whether the solution is complete.
@@ -131,11 +136,6 @@ impl Solver {
             Stage::Done(gradients) => Stage::Done(gradients),
         };
         Ok(matches!(self.stage, Stage::Done(_)))
-    }
-
-    /// Returns whether the constraints were replaced by [`Self::revise`] since the solver was created.
-    pub fn is_revised(&self) -> bool {
-        self.revision.is_some() || self.system.is_revised()
     }
 
     /// Returns how far the solver has got, as a position for [`Self::advance_to`], to be saved with a run.
@@ -287,7 +287,7 @@ impl Solver {
 
 /// How far a [`Solver`] has got, in slices of work; it is saved with a run, which is restored by repeating as much
 /// work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SolverPosition {
     /// Whether matrix and preconditioner are complete, including their revision if one was requested.
     built: bool,

@@ -148,11 +148,6 @@ impl System {
         self.revision = Some(Revision { removed, rows, inverse });
     }
 
-    /// Returns whether the system was revised for other constraints since its matrix was computed.
-    pub fn is_revised(&self) -> bool {
-        self.revision.is_some()
-    }
-
     /// Returns the centres for which the matrix was computed, without those added by a revision.
     fn base_centres(&self) -> &[DVec3] {
         &self.centres[..self.revision.as_ref().map_or(self.centres.len(), |revision| revision.removed.len())]
