@@ -231,7 +231,8 @@ export class MultiresolutionModel implements Stepper {
 
   /**
    * Number of vertices of the mesh whose detail was reduced to avoid self-intersections, summed over the surfaces of
-   * the decomposition above the base.
+   * the decomposition above the base. With `support: 'surface'`, the vertices that are not where the ellipsoids move them, for
+   * the same reason: where they are depends on the way of the ellipsoids.
    */
   get heldVertices(): number {
     return this.#counts().heldVertices;

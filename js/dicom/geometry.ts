@@ -57,7 +57,8 @@ export function smallest(numbers: Iterable<number>): number {
   return least;
 }
 
-const shown = (length: number) => `${Number(length.toPrecision(4))} mm`;
+/** Returns a length in words. */
+export const shown = (length: number) => `${Number(length.toPrecision(4))} mm`;
 
 /** Returns the distances of sorted slices from the first one, along the normal. */
 export function distancesOf(slices: readonly Frame[]): number[] {

@@ -2,7 +2,7 @@
 import type { VolumeInit } from '../data.js';
 import { withPause } from '../pause.js';
 import { listed } from './error.js';
-import { affineOf, distancesOf, placementProblem, shiftOf, smallest } from './geometry.js';
+import { affineOf, distancesOf, largest, placementProblem, shiftOf, shown, smallest } from './geometry.js';
 import { isAlike } from './grouping.js';
 import type { Parser } from './parser.js';
 import { arrayOf, PixelReader } from './pixels.js';
@@ -22,8 +22,8 @@ interface Slices {
   count: number;
 }
 
-/** Returns the slices of the frames of a segmentation, which has none where no segment is; undefined if they are uneven. */
-function slicesOf(images: readonly Frame[]): Slices | undefined {
+/** Returns the slices of the frames of a segmentation, which has none where no segment is, or why they have none. */
+function slicesOf(images: readonly Frame[]): Slices | string {
   const normal = distancesOf(images);
   const order = images.map((image, k) => [image, normal[k] ?? 0] as const).toSorted((a, b) => a[1] - b[1]);
   const frames = order.map(([image]) => image);
@@ -38,7 +38,11 @@ function slicesOf(images: readonly Frame[]): Slices | undefined {
   const slices = distances.map((distance) => Math.round(distance / step));
   const count = (slices.at(-1) ?? 0) + 1;
   const isEven = distances.every((distance, k) => Math.abs(distance / step - (slices[k] ?? 0)) <= OFF);
-  return isEven && count <= MOST_SLICES ? { frames, slices, count } : undefined;
+  if (!isEven)
+    return `a segmentation with frames at uneven distances, ${shown(smallest(steps))} to ${shown(largest(steps))}`;
+  if (count <= MOST_SLICES) return { frames, slices, count };
+  const most = `${count} slices of ${shown(step)}, and at most ${MOST_SLICES} are possible`;
+  return `a segmentation with gaps of up to ${shown(largest(steps))} between its frames: these are ${most}`;
 }
 
 /** Returns the distance between slices: that which the file states, if frames are at multiples of it, else the least one. */
@@ -92,7 +96,7 @@ export class SegmentationVolume extends DicomVolume {
     const problem = problemOf(images);
     if (problem !== undefined) return problem;
     const slices = slicesOf(images);
-    if (!slices) return 'a segmentation with frames at uneven distances';
+    if (typeof slices === 'string') return slices;
     const shift = shiftOf(slices.frames);
     if (shift !== undefined) return shift;
     const { frames, count } = slices;

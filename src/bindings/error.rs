@@ -67,7 +67,7 @@ impl From<VolumeError> for Failure {
     fn from(error: VolumeError) -> Self {
         let code = match error {
             VolumeError::InvalidArgument { .. } => "invalid-argument",
-            VolumeError::TooLarge { .. } => "too-large",
+            VolumeError::TooManyTriangles { .. } | VolumeError::TooLarge { .. } => "too-large",
         };
         Self::new(code, error.to_string())
     }

@@ -272,6 +272,10 @@ pub(super) fn volume_error(format: &'static str, error: VolumeError) -> FormatEr
             FormatError::invalid(format, parameter, problem)
         }
         VolumeError::TooLarge { bytes } => FormatError::too_large(format, "voxels", bytes),
+        // Readers make no contours.
+        other @ VolumeError::TooManyTriangles { .. } => {
+            FormatError::invalid(format, "voxels", other.to_string())
+        }
     }
 }
 

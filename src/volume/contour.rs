@@ -67,7 +67,7 @@ pub(crate) fn marching_cubes_of_slices<'a>(
 /// Extracts the iso-surface as [`marching_cubes_of_slices`], with about `most` triangles at most.
 ///
 /// # Errors
-/// As there; [`VolumeError::TooLarge`] for more triangles.
+/// As there; [`VolumeError::TooManyTriangles`].
 pub(crate) fn bounded_marching_cubes<'a>(
     dims: [usize; 3],
     iso: f32,
@@ -81,10 +81,8 @@ pub(crate) fn bounded_marching_cubes<'a>(
     for z in 0..=dims[2] {
         let next = if z < dims[2] { slice(z) } else { Cow::default() };
         marching.layer(z, next)?;
-        let triangles = marching.mesh.triangles.len();
-        if triangles > most {
-            // Work with a surface takes ten times its memory.
-            return Err(VolumeError::TooLarge { bytes: 180 * triangles as u64 });
+        if marching.mesh.triangles.len() > most {
+            return Err(VolumeError::TooManyTriangles { most });
         }
     }
     Ok(marching.mesh)
@@ -317,6 +315,17 @@ mod tests {
     use std::collections::BTreeMap;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn too_many_triangles_are_refused_by_their_number() {
+        let ball = ball(20, 8.0);
+        let slice = |z: usize| ball.values[z * 400..(z + 1) * 400].into();
+        let count = bounded_marching_cubes(ball.dims, 0.0, usize::MAX, &slice).unwrap().triangles.len();
+        assert!(bounded_marching_cubes(ball.dims, 0.0, count, &slice).is_ok());
+        let error = bounded_marching_cubes(ball.dims, 0.0, count - 1, &slice).unwrap_err();
+        assert_eq!(error, VolumeError::TooManyTriangles { most: count - 1 });
+        assert!(error.to_string().starts_with("the contour has more than"), "{error}");
+    }
 
     fn field(dims: [usize; 3], f: impl Fn(Vec3) -> f32) -> Grid {
         let mut values = Vec::new();

@@ -11,7 +11,15 @@ pub enum VolumeError {
         /// Reason for the rejection, with the accepted values.
         problem: String,
     },
-    /// An allocation failed, or a limit would be exceeded, such as that of the triangles of a contour.
+    /// A contour would have more triangles than what starts from it may have.
+    #[error(
+        "the contour has more than {most} triangles, which is the most: choose another iso value, a coarser volume, or another start"
+    )]
+    TooManyTriangles {
+        /// Largest number of triangles.
+        most: usize,
+    },
+    /// An allocation failed, or a limit would be exceeded.
     #[error("the volume needs {bytes} bytes, more than is allowed, or left of the 4 GiB of WebAssembly")]
     TooLarge {
         /// Memory that the operation would need, in bytes.

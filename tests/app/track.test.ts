@@ -6,6 +6,7 @@ import init, { Mesh, Volume } from '../../pkg/index.js';
 import { cineVoxels } from '../../www/src/track/cine';
 import {
   type App,
+  anotherPage,
   cancelAtOnce,
   drop,
   openApp,
@@ -443,4 +444,40 @@ test('can be paused at any time, and a new image ends the run', async () => {
   await expect.poll(state).toBe('running');
   await dropSmall();
   await tracked(4);
+});
+
+test('while the frame is dragged, one request for votes waits for its answer, and then the frame shown gets its own', async () => {
+  const page = await anotherPage(app, () => {
+    const { postMessage } = Worker.prototype;
+    const sent: number[] = [];
+    const held: (() => void)[] = [];
+    Object.assign(window, { votes: { sent, release: () => held.splice(0).map((send) => send()) } });
+    // Holds requests for votes back, as a worker that is busy would.
+    Worker.prototype.postMessage = function (this: Worker, ...given: Parameters<typeof postMessage>) {
+      const [message] = given;
+      if (message?.kind !== 'votes') return postMessage.apply(this, given);
+      sent.push(message.body.frame);
+      held.push(() => postMessage.apply(this, given));
+    } as typeof postMessage;
+  });
+  const votes = <Result>(get: (votes: { sent: number[]; release: () => void }) => Result) =>
+    page.evaluate(`(${get})(window.votes)`) as Promise<Result>;
+  await page.goto(`${app.address}#track?example=ventricle`);
+  await reach(page, 'done');
+  const displayed = async () =>
+    JSON.parse((await page.getAttribute('[data-measures]', 'data-measures')) ?? '{}').frame as number;
+  const show = async (frame: number) => {
+    await page.locator('.frames input[type=range]').fill(String(frame));
+    await expect.poll(displayed).toBe(frame + 1);
+  };
+  await show(0);
+  await page.selectOption('[data-view=below]', 'boundary');
+  await expect.poll(() => votes(({ sent }) => sent)).toEqual([0]);
+  for (const frame of [1, 2, 3, 4, 5]) await show(frame);
+  expect(await votes(({ sent }) => sent)).toEqual([0]);
+  await votes(({ release }) => release());
+  await expect.poll(() => votes(({ sent }) => sent)).toEqual([0, 5]);
+  await votes(({ release }) => release());
+  await expect.poll(async () => Number(await page.getAttribute('[data-stills]', 'data-votes'))).toBeGreaterThan(0);
+  await page.close();
 });

@@ -388,6 +388,15 @@ describe('segmentations', () => {
     expect([error.code, error.message]).toEqual(['too-large', expect.stringMatching(reason)]);
   });
 
+  test('of frames between which there are too many slices, or at uneven distances, are skipped for that', async () => {
+    const at = (...positions: number[]) => positions.map((z) => ({ position: `0\\0\\${z}`, segment: 1 }));
+    const gaps = segmentation(at(0, 60, 120), {}, [textElement('00180088', 'DS', '0.001')]);
+    expect(reasons(await openDicom(gaps))[0]).toMatch(
+      /gaps of up to 60 mm between its frames: these are 120001 slices of 0.001 mm, and at most 65536 are possible/,
+    );
+    expect(reasons(await openDicom(segmentation(at(0, 1, 2.5))))[0]).toMatch(/uneven distances, 1 mm to 1.5 mm/);
+  });
+
   test('of slices at a distance that no volume has are skipped', async () => {
     const far = ['0\\0\\0', '0\\0\\1e12'].map((position) => ({ position, segment: 1 }));
     const error = await rejection(readDicom(segmentation(far, {}, [textElement('00180088', 'DS', '0')])));

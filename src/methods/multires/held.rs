@@ -47,6 +47,9 @@ const STEP: f64 = 0.15;
 /// hundredth of the largest step of where they have to. With few, a far target stopped them where a near one did not.
 const MOST_HALVINGS: u32 = 6;
 
+/// Distance of a vertex from where the handles move it, in typical edges, above which it is held back, and not only rounded.
+const MISSED: f32 = 1e-3;
+
 /// Largest distance of the middle of an edge from the given surface by rounding, as a share of the edge.
 const ON_SURFACE: f64 = 1e-5;
 
@@ -218,6 +221,19 @@ impl Held {
     fn motion_of(&self, now: &Placed, v: VertexId) -> Option<Motion> {
         let count = self.handles.len();
         motion_at(&self.handles, &now.distances[v.index() * count..][..count])
+    }
+
+    /// Returns the number of vertices of a surface with the given places that are not where the handles move them: they would
+    /// have intersected others.
+    pub fn held_vertices(&self, surface: &Mesh, points: &Correspondence) -> usize {
+        let count = self.handles.len();
+        let is_held = |v: &VertexId| {
+            let (p, distances) = (points[v.index()].point, &self.distances[v.index() * count..][..count]);
+            let target =
+                motion_at(&self.handles, distances).map_or(p, |motion| motion.of(p.as_dvec3()).as_vec3());
+            surface.position(*v).distance(target) > MISSED * self.edge
+        };
+        surface.vertices().filter(is_held).count()
     }
 
     /// Returns the reach of a handle, and the distance of each vertex from it, by slot: along the given surface, but at

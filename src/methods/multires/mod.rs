@@ -450,8 +450,11 @@ impl MultiresolutionModel {
 
     /// Returns two counts of vertices from the last reconstruction of the detail: those where a normal did not hit the
     /// next finer surface, and those whose displacement was shortened to avoid self-intersections, summed over the
-    /// bands.
+    /// bands; of a surface that holds itself, none, and the vertices that are not where the ellipsoids move them.
     pub fn detail_counts(&self) -> [usize; 2] {
+        if let Some(held) = &self.held {
+            return [0, held.held_vertices(&self.surface, &self.correspondence)];
+        }
         [self.detailed.unmatched_vertices, self.detailed.held_vertices]
     }
 
