@@ -16,6 +16,7 @@ import {
   unnamedControls,
 } from './browser';
 import { LONG } from './long';
+import { blackPng } from './made-png';
 import { countPixels } from './pixels';
 
 let app: App;
@@ -480,6 +481,26 @@ describe('files', () => {
     expect(await measured()).toMatchObject({ components: 1, genus: 0, closed: true });
     expect(await app.page.locator('.strip button').count()).toBe(2);
     expect(await app.page.inputValue('[data-view=color]')).toBe('own');
+  });
+
+  test('photographs of far more pixels than their files have bytes are not decoded', async () => {
+    const cameras = (count: number) =>
+      JSON.stringify({ cameras: Array(count).fill({ P: Array(12).fill(1), image: 'a.png' }) });
+    const message = async (size: number, count: number) => {
+      const files = { 'cameras.json': new TextEncoder().encode(cameras(count)), 'a.png': blackPng(size, size) };
+      await drop(
+        app.page,
+        Object.entries(files).map(([name, bytes]) => ({ name, bytes })),
+      );
+      await reach(app.page, 'error');
+      const shown = await text('.banner');
+      await app.page.keyboard.press('Escape');
+      return shown;
+    };
+    expect(await message(5000, 1)).toContain('25 million pixels');
+    expect(await message(1000, 17)).toContain('17 million pixels');
+    // These are decoded, and what is wrong with their cameras is found.
+    expect(await message(1000, 16)).toContain('cameras: the left 3×3 block');
   });
 });
 

@@ -195,8 +195,9 @@ fn a_cell_that_does_not_suit_the_points_is_refused_in_words() {
         let cloud = Cloud { points: noisy(sphere, 300, 0.0, 3), ..Cloud::default() };
         let mut surface = ImplicitSurface::new(cloud, options).unwrap();
         let failure = loop {
-            if let Err(failure) = surface.step() {
-                break failure.to_string();
+            match surface.step() {
+                Ok(report) => assert!(!report.done, "{cell} is accepted"),
+                Err(failure) => break failure.to_string(),
             }
         };
         assert!(failure.contains("must be 0, or from "), "{failure}");

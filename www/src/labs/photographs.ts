@@ -1,5 +1,6 @@
 /** Reads photographs with their cameras and masks, for the Reconstruct lab. */
 
+import { checkPictures } from '../pictures';
 import type { CameraView } from '../reconstruct/protocol';
 import { text } from '../texts';
 
@@ -38,7 +39,12 @@ const MASKED = 128;
  */
 export async function readPhotographs(json: string, fileOf: FileByName): Promise<Photograph[]> {
   const file = parseCameras(json);
-  return Promise.all(file.cameras.map((entry, i) => readOne(entry, i, file, fileOf)));
+  const named = async (name: string | undefined) => (name ? await fileOf(name) : undefined);
+  const pictures = await Promise.all(
+    file.cameras.map(async ({ image, mask }) => ({ image: await named(image), mask: await named(mask) })),
+  );
+  await checkPictures(pictures.flatMap(({ image, mask }) => [image ?? [], mask ?? []].flat()));
+  return Promise.all(file.cameras.map((entry, i) => readOne(entry, i, file, pictures[i] ?? {})));
 }
 
 function parseCameras(json: string): CameraFile {
@@ -52,14 +58,17 @@ function parseCameras(json: string): CameraFile {
   return file as CameraFile;
 }
 
-async function readOne(entry: CameraEntry, i: number, file: CameraFile, fileOf: FileByName): Promise<Photograph> {
+async function readOne(
+  entry: CameraEntry,
+  i: number,
+  file: CameraFile,
+  { image, mask }: { image?: Blob | undefined; mask?: Blob | undefined },
+): Promise<Photograph> {
   const projection = (entry.P ?? []).flat();
   if (projection.length !== 12 || !projection.every(Number.isFinite))
     throw new Error(text('reconstruct.cameraNeedsP', { number: i + 1 }));
   const name = entry.image ?? text('reconstruct.camera', { number: i + 1 });
-  const blob = entry.image ? await fileOf(entry.image) : undefined;
-  const mask = entry.mask ? await fileOf(entry.mask) : undefined;
-  const picture = blob && (await decode(blob, name));
+  const picture = image && (await decode(image, name));
   const width = entry.width ?? file.width ?? picture?.width ?? 0;
   const height = entry.height ?? file.height ?? picture?.height ?? 0;
   if (picture && (picture.width !== width || picture.height !== height))

@@ -1,9 +1,11 @@
 import { RepeatWrapping, SRGBColorSpace, Texture } from 'three';
+import { checkPictures } from '../pictures';
 import type { MeshTexture } from '../sculpt/protocol';
 
 /** Decodes the texture of a mesh for three.js; v points downwards in the texture coordinates, as in glTF. */
 export async function pictureOf({ type, bytes }: MeshTexture): Promise<Texture> {
   const blob = new Blob([bytes as Uint8Array<ArrayBuffer>], { type });
+  await checkPictures([blob]);
   const texture = new Texture(await createImageBitmap(blob));
   texture.flipY = false;
   texture.colorSpace = SRGBColorSpace;
