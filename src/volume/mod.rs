@@ -301,12 +301,10 @@ impl Volume {
         converted(&self.voxels, start..end, |v| kept(v * self.slope + self.intercept))
     }
 
-    /// Returns all intensities of one frame less `base`, which is subtracted in `f64`, with those that are not finite
-    /// replaced by [`Self::finite`].
-    fn intensities_above(&self, base: f64, frame: usize) -> Result<Vec<f32>, VolumeError> {
-        let start = self.frame_start(frame)?;
-        let end = start + self.frame_len();
-        converted(&self.voxels, start..end, |v| self.finite(v * self.slope + self.intercept) - base)
+    /// Returns the intensities of the voxels with the given indices, less `base`, which is subtracted in `f64`, with those that
+    /// are not finite replaced by [`Self::finite`].
+    fn intensities_above(&self, base: f64, indices: Range<usize>) -> Result<Vec<f32>, VolumeError> {
+        converted(&self.voxels, indices, |v| self.finite(v * self.slope + self.intercept) - base)
     }
 
     /// Returns one frame as a grid of `f32` intensities in index coordinates; NaN becomes the lower end of the range.
@@ -314,7 +312,9 @@ impl Volume {
     /// # Errors
     /// `frame` out of range; [`VolumeError::TooLarge`].
     pub fn grid(&self, frame: usize) -> Result<Grid, VolumeError> {
-        Ok(Grid { dims: self.dims(), values: self.intensities_above(0.0, frame)? })
+        let start = self.frame_start(frame)?;
+        let values = self.intensities_above(0.0, start..start + self.frame_len())?;
+        Ok(Grid { dims: self.dims(), values })
     }
 
     /// Returns one frame as a grid with intensities scaled from [`Self::range`] to [0, 1]; NaN and −∞ become 0, +∞

@@ -34,25 +34,50 @@ impl Volume {
     pub fn pyramid(&self, levels: usize, factor: f64) -> Result<Vec<Volume>, VolumeError> {
         check_factor(factor)?;
         self.check_levels(levels, factor)?;
-        let spacing = self.spacing();
+        let mut spacing = self.spacing();
         let mut unit = smallest(spacing);
         let shift = self.pyramid_shift();
-        let frame = |t| Ok(Grid { dims: self.dims(), values: self.intensities_above(shift, t)? });
-        let mut here = (0..self.frames()).map(frame).collect::<Result<Vec<_>, VolumeError>>()?;
-        let mut here_spacing = spacing;
+        let mut here: Vec<Grid> = Vec::new();
         let mut out = vec![self.clone()];
         while out.len() < levels {
-            let mut next = Vec::with_capacity(here.len());
-            let mut next_spacing = here_spacing;
-            for grid in &here {
-                let (coarse, coarse_spacing) = grid.reduce(here_spacing, unit, factor)?;
-                next.push(coarse);
-                next_spacing = coarse_spacing;
-            }
+            let from = here.first().map_or(self.dims(), |grid| grid.dims);
+            let next = if here.is_empty() {
+                let frames = 0..self.frames();
+                frames
+                    .map(|t| self.reduced_frame(t, shift, spacing, [unit, factor]))
+                    .collect::<Result<_, _>>()?
+            } else {
+                let reduced = here.iter().map(|grid| Ok(grid.reduce(spacing, unit, factor)?.0));
+                reduced.collect::<Result<Vec<Grid>, VolumeError>>()?
+            };
             out.push(self.level(&next, shift)?);
-            (here, here_spacing, unit) = (next, next_spacing, unit * factor);
+            spacing = spacing_of(spacing, from, reduced_dims(from, factor));
+            (here, unit) = (next, unit * factor);
         }
         Ok(out)
+    }
+
+    /// Returns what [`Grid::reduce`] makes of the intensities of a frame less `shift`; slice by slice, as intensities in
+    /// single precision may take four times as much memory as the volume.
+    fn reduced_frame(
+        &self,
+        frame: usize,
+        shift: f64,
+        spacing: [f64; 3],
+        steps: [f64; 2],
+    ) -> Result<Grid, VolumeError> {
+        let [nx, ny, nz] = self.dims();
+        let [x, y, z] = reduction(self.dims(), [true; 3], spacing, steps)?;
+        let dims = [x.spans.len(), y.spans.len(), nz];
+        let mut along_xy = Grid { dims, values: reserve(dims.iter().product())? };
+        for slice in 0..nz {
+            let start = self.frame_start(frame)? + slice * nx * ny;
+            let values = self.intensities_above(shift, start..start + nx * ny)?;
+            let slice = Grid { dims: [nx, ny, 1], values };
+            let reduced = slice.resample_x(&x, dims[0])?.resample_rows(&y, dims[1], 1)?;
+            along_xy.values.extend_from_slice(&reduced.values);
+        }
+        along_xy.resample_rows(&z, z.spans.len(), 2)
     }
 
     /// Returns the largest number of levels, this volume included, of a pyramid with the reduction factor `factor` in
@@ -137,11 +162,10 @@ impl Grid {
         unit: f64,
         factor: f64,
     ) -> Result<(Grid, [f64; 3]), VolumeError> {
-        let taps = self.reduction(axes, spacing, [unit, factor])?;
+        let taps = reduction(self.dims, axes, spacing, [unit, factor])?;
         let dims = [0, 1, 2].map(|axis| taps[axis].spans.len());
         let coarse = self.resample(&taps, dims)?;
-        let next = [0, 1, 2].map(|axis| spacing[axis] * self.dims[axis] as f64 / dims[axis] as f64);
-        Ok((coarse, next))
+        Ok((coarse, spacing_of(spacing, self.dims, dims)))
     }
 
     /// Updates `coarse`, which [`Self::reduce`] returned for this grid and the same `spacing`, `unit` and `factor`,
@@ -172,7 +196,7 @@ impl Grid {
         spacing: [f64; 3],
         steps: [f64; 2],
     ) -> Result<Option<Region>, VolumeError> {
-        let taps = self.reduction(axes, spacing, steps)?;
+        let taps = reduction(self.dims, axes, spacing, steps)?;
         let parts = [0, 1, 2].map(|axis| {
             let first = changed.min[axis];
             taps[axis].part(first..first + changed.dims[axis])
@@ -187,24 +211,6 @@ impl Grid {
         let part = self.part(from)?.resample(&[x.weights, y.weights, z.weights], to.dims)?;
         coarse.overwrite(to, &part);
         Ok(Some(to))
-    }
-
-    fn reduction(
-        &self,
-        axes: [bool; 3],
-        spacing: [f64; 3],
-        [unit, factor]: [f64; 2],
-    ) -> Result<[ResamplingWeights; 3], VolumeError> {
-        check_factor(factor)?;
-        let positive = |v: f64| v > 0.0 && v.is_finite();
-        if !spacing.iter().all(|&s| positive(s)) || !positive(unit) {
-            return Err(VolumeError::invalid("spacing", "spacing and unit must be positive and finite"));
-        }
-        let reduced = reduced_dims(self.dims, factor);
-        Ok([0, 1, 2].map(|axis| {
-            let (from, unit) = (self.dims[axis], unit / spacing[axis]);
-            ResamplingWeights::new(from, if axes[axis] { reduced[axis] } else { from }, unit)
-        }))
     }
 
     fn resample(&self, taps: &[ResamplingWeights; 3], dims: [usize; 3]) -> Result<Grid, VolumeError> {
@@ -249,6 +255,31 @@ impl Grid {
         }
         Ok(Grid { dims, values })
     }
+}
+
+/// Returns the weights along each axis that reduce a grid of `dims` as [`Grid::reduce_along`] does; the last argument is
+/// `unit` and `factor`.
+fn reduction(
+    dims: [usize; 3],
+    axes: [bool; 3],
+    spacing: [f64; 3],
+    [unit, factor]: [f64; 2],
+) -> Result<[ResamplingWeights; 3], VolumeError> {
+    check_factor(factor)?;
+    let positive = |v: f64| v > 0.0 && v.is_finite();
+    if !spacing.iter().all(|&s| positive(s)) || !positive(unit) {
+        return Err(VolumeError::invalid("spacing", "spacing and unit must be positive and finite"));
+    }
+    let reduced = reduced_dims(dims, factor);
+    Ok([0, 1, 2].map(|axis| {
+        let (from, unit) = (dims[axis], unit / spacing[axis]);
+        ResamplingWeights::new(from, if axes[axis] { reduced[axis] } else { from }, unit)
+    }))
+}
+
+/// Returns the spacing of a grid of `to` voxels in the box of one of `from` voxels with the given spacing.
+fn spacing_of(spacing: [f64; 3], from: [usize; 3], to: [usize; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|axis| spacing[axis] * from[axis] as f64 / to[axis] as f64)
 }
 
 #[inline]

@@ -28,7 +28,7 @@ const OPERATIONS: Record<keyof MeshInSlices, (mesh: Mesh | MeshInSlices) => unkn
   decimate: (mesh) => mesh.decimate(1000.5),
   decimateWithin: (mesh) => mesh.decimateWithin(0.01, { targetTriangles: 500 }),
   smooth: (mesh) => mesh.smooth({ iterations: 3 }),
-  toVolume: async (mesh) => (await mesh.toVolume(GRID, { kind: 'distance' })).frame(0),
+  toVolume: async (mesh) => (await mesh.toVolume(GRID, { kind: 'distance' })).intensities(),
   check: (mesh) => mesh.check(),
   distanceTo: (mesh) => mesh.distanceTo(OTHER),
 };

@@ -150,7 +150,8 @@ export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
  * and white.
  */
 export function levelsOf(volume: Volume, levels: number, window: [number, number]): LevelView[] {
-  const [, ...coarser] = volume.pyramid(levels + 1);
+  const [same, ...coarser] = volume.pyramid(levels + 1);
+  same?.free();
   return coarser.map((level) => {
     try {
       return { dims: level.dims, voxels: intensitiesOf(level), window };
