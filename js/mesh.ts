@@ -201,9 +201,9 @@ export interface MeshInSlices {
   decimateWithin(maxDistance: number, options?: { targetTriangles?: number }): Promise<void>;
   /** As {@link Mesh.smooth}. */
   smooth(options: { iterations: number; keepVolume?: boolean }): Promise<void>;
-  /** As {@link Mesh.toVolume}, for the surface as it is when it is called. */
+  /** As {@link Mesh.toVolume}, for the surface at the time of the call. */
   toVolume(like: Volume, options?: { kind?: VoxelKind; value?: number }): Promise<Volume>;
-  /** As {@link Mesh.check}, for the surface as it is when it is called. */
+  /** As {@link Mesh.check}, for the surface at the time of the call. */
   check(): Promise<MeshReport>;
   /** As {@link Mesh.distanceTo}, for the two surfaces as they are when it is called. */
   distanceTo(other: Mesh): Promise<SurfaceDistance>;

@@ -69,7 +69,7 @@ export async function openZarr(source: ZarrSource, given?: ZarrOptions): Promise
   const requests = new Requests(store, { ...limits, concurrency });
   const image = await openLevels(zarrita, requests, path, { channel, time }, signal);
   const volume = new ZarrVolume({ ...image, cache, concurrency });
-  await volume.readCoarsest(signal);
+  await volume.readCoarsest(signal, () => requests.chunkBytes);
   return volume;
 }
 

@@ -86,6 +86,8 @@ export class Requests implements AsyncReadable {
   readonly #slots: Slots;
   /** Bytes of metadata so far. */
   #metadata = 0;
+  /** Bytes of chunks so far, as they are stored. */
+  #chunks = 0;
   /** Files that had to exist and did not. */
   readonly #missing = new Set<Key>();
 
@@ -94,6 +96,11 @@ export class Requests implements AsyncReadable {
     this.#options = options;
     this.#slots = new Slots(options.concurrency);
     if (store.getRange) this.getRange = (key, range, given) => this.#getRange(key, range, given);
+  }
+
+  /** Number of bytes of chunks that have been read, as they are stored. */
+  get chunkBytes(): number {
+    return this.#chunks;
   }
 
   async get(key: Key, given: FileOptions = {}): Promise<Uint8Array | undefined> {
@@ -132,7 +139,10 @@ export class Requests implements AsyncReadable {
     send: (signal: AbortSignal) => Promise<Uint8Array | undefined>,
   ): Promise<Uint8Array | undefined> {
     const bytes = this.#missing.has(key) ? undefined : await this.#run(key, send, signal);
-    if (bytes !== undefined) checkDecoded(key, bytes.length, decodesTo);
+    if (bytes !== undefined && decodesTo > 0) {
+      this.#chunks += bytes.length;
+      checkDecoded(key, bytes.length, decodesTo);
+    }
     if (bytes !== undefined || !mustExist) return bytes;
     this.#missing.add(key);
     throw new NotStored();

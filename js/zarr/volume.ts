@@ -4,6 +4,7 @@ import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
 import { type Pause, withPause } from '../pause.js';
 import { Handle } from '../runtime.js';
+import { unpackingProblem } from '../small-files.js';
 import { SPARSE_SOURCE, type SparseSource } from '../sparse.js';
 import { checkSignal } from '../stepper.js';
 import { RawSparseVolume } from '../vesicle.js';
@@ -121,7 +122,8 @@ export class ZarrVolume {
 
   /**
    * Smallest and largest finite intensity of the coarsest level; undefined if it has no finite voxel, or was not read
-   * when the image was opened: it is larger than 256 MB, is in more than 16,384 chunks, or those are larger than 2 GB.
+   * when the image was opened: it is larger than 256 MB, or than 32 MiB if its chunks are stored in up to 128 KiB, is in
+   * more than 16,384 chunks, or those are larger than 2 GB.
    */
   get range(): [number, number] | undefined {
     this.#check();
@@ -134,16 +136,18 @@ export class ZarrVolume {
   }
 
   /**
-   * Reads the coarsest level, unless it is very large.
+   * Reads the coarsest level, unless it is very large; `stored` returns how many bytes of chunks have been read.
    *
    * @internal
    */
-  async readCoarsest(signal: AbortSignal | undefined): Promise<void> {
+  async readCoarsest(signal: AbortSignal | undefined, stored: () => number): Promise<void> {
     const index = this.#levels.length - 1;
     const level = levelAt(this.#levels, index);
     this.#unread = whyUnread(level);
     if (this.#unread) return;
     const { data } = await this.voxels(index, { min: [0, 0, 0], max: level.info.dims }, signal && { signal });
+    this.#unread = whyUnused(level, stored());
+    if (this.#unread) return this.#cache.clear(undefined);
     this.#coarsest = data;
     this.#range = await rangeOf(data, signal);
   }
@@ -306,6 +310,12 @@ function whyUnread({ bytes, chunkCount, decodedBytes }: Level): string {
   if (chunkCount > MOST_CHUNKS) return `the coarsest level must have at most ${MOST_CHUNKS} chunks, got ${chunkCount}`;
   if (decodedBytes <= MOST_DECODED) return '';
   return `the chunks of the coarsest level must not be larger than 2 GB, got ${Math.ceil(decodedBytes / 1e6)} MB`;
+}
+
+/** Returns why a level that was read is not used: a model of few bytes could take gigabytes. An empty text if it is. */
+function whyUnused({ bytes }: Level, stored: number): string {
+  const problem = unpackingProblem(bytes, stored, 'store a coarser level, too');
+  return problem ? `the coarsest level ${problem}` : '';
 }
 
 /** Number of voxels that are looked through without a pause. */

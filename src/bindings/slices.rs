@@ -157,7 +157,7 @@ impl RawMesh {
         })
     }
 
-    /// Begins what `toVolume` does, of the surface as it is now; the value is the `RawVolume`.
+    /// Begins what `toVolume` does, of the present surface; the value is the `RawVolume`.
     #[wasm_bindgen(js_name = toVolumeInSlices)]
     pub fn to_volume_in_slices(
         &self,
@@ -172,7 +172,7 @@ impl RawMesh {
         })))
     }
 
-    /// Begins what `check` does, of the surface as it is now; the value is a `MeshReport`.
+    /// Begins what `check` does, of the present surface; the value is a `MeshReport`.
     #[wasm_bindgen(js_name = checkInSlices)]
     pub fn check_in_slices(&self) -> RawMeshWork {
         let mesh = self.triangles();

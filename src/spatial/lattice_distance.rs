@@ -190,7 +190,7 @@ const TOUCHING: f64 = 1e-6;
 /// Candidates of a block that are a unit of work.
 const CANDIDATES_PER_UNIT: usize = 16;
 
-/// What is to be done, on a stack.
+/// A part of the work, on a stack.
 enum Task {
     /// Compute the distances of all points of a block: `candidates` are those of the block that it is half of, whose centre
     /// is `outer`, and `near` is the closest triangle to it.

@@ -123,15 +123,24 @@ describe('a chunk of few bytes', () => {
   });
 
   test('is read up to the limit', async () => {
-    expect((await openZarr(constant(2 ** 16))).range).toEqual([7, 7]);
+    const zarr = await openZarr(constant(2 ** 16));
+    const { data } = await zarr.voxels(0, { min: [1022, 65_000, 0], max: [1024, 65_001, 1] });
+    expect(data).toEqual(Uint8Array.of(7, 7));
     expect((await rejection(openZarr(constant(2 ** 16 + 1)))).code).toBe('too-large');
   });
 
-  test('of which an image has many', async () => {
-    const given = { shape: [1, 240_000, 1024], chunks: [1, 20_000, 1024], codecs: [zstd] };
-    const files = image(given);
-    for (let y = 0; y < 12; y++) files.set(`/0/c/0/${y}/0`, zstdSized(20_000 * 1024));
-    expect((await openZarr(new TestStore(files))).range).toEqual([7, 7]);
+  test('of which an image has many: its coarsest level has up to 32 MiB', async () => {
+    const many = (height: number) => {
+      const files = image({ shape: [1, 4 * height, 1024], chunks: [1, height, 1024], codecs: [zstd] });
+      for (let y = 0; y < 4; y++) files.set(`/0/c/0/${y}/0`, zstdSized(height * 1024));
+      return openZarr(new TestStore(files));
+    };
+    expect(await many(2 ** 13)).toMatchObject({ range: [7, 7], unread: '' });
+    const larger = await many(2 ** 13 + 1);
+    expect([larger.range, larger.unread]).toEqual([
+      undefined,
+      expect.stringMatching(/^the coarsest .* may unpack to 32 MiB: store a coarser level/),
+    ]);
   });
 });
 

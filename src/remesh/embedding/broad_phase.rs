@@ -122,7 +122,7 @@ impl Embedding {
         }
         let is_close = a.position.distance_squared(b.position) < proximity.least * proximity.least;
         for (v, w) in [(a.vertex, b.vertex), (b.vertex, a.vertex)] {
-            // A list that is made anew cannot have it yet, as each pair is found once.
+            // A list that was cleared cannot have it yet, since each pair is found once.
             if self.is_searched_around(v) || self.position_of(v, w).is_none() {
                 // The other vertex may still have a certificate of the pair.
                 let known = if self.is_searched_around(w) { None } else { self.position_of(w, v) };

@@ -53,7 +53,7 @@ export class LabStates {
     this.#cancellable.subscribe(subscriber);
   }
 
-  /** What is cancelled gives way to what was open before, or to something else. */
+  /** Work can be cancelled where something was open before, or something else is to be opened. */
   #offerCancel(): void {
     this.#cancellable.value = this.value === 'loading' && (this.ready || this.#hasOther);
   }
