@@ -1,6 +1,6 @@
 // Work that ends as a whole.
 
-/** What is called when a signal aborts. */
+/** Functions to call when a signal aborts. */
 const CALLS = new WeakMap<AbortSignal, Set<() => void>>();
 
 /**

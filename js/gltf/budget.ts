@@ -11,7 +11,7 @@ const GROWTH = 64;
 /** Bytes of files that are small, and the most that these may decode to: twice as much as for the best compressed. */
 const [SMALL, LIMIT_OF_SMALL] = [1 << 17, 1 << 24];
 
-/** Returns the most bytes that files of so many bytes may decode to. */
+/** Returns the most bytes that files of this size may decode to. */
 const limitOf = (fileBytes: number): number =>
   fileBytes <= SMALL ? LIMIT_OF_SMALL : Math.max(LIMIT, fileBytes * GROWTH);
 

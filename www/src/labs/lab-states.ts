@@ -53,7 +53,7 @@ export class LabStates {
     this.#cancellable.subscribe(subscriber);
   }
 
-  /** What is cancelled gives way to what was open before, or to something else. */
+  /** Cancelling opens again the data that were open before, or else the first example. */
   #offerCancel(): void {
     this.#cancellable.value = this.value === 'loading' && (this.ready || this.#hasOther);
   }
