@@ -22,6 +22,14 @@ impl Mesh {
         found
     }
 
+    /// Returns the vertices of the component of `v`, and marks them in `seen`, by slot; none if `v` is marked. For several
+    /// components, which takes time in proportion to these alone.
+    pub(crate) fn unseen_component_of(&self, v: VertexId, seen: &mut [bool]) -> Vec<VertexId> {
+        let mut found = Vec::new();
+        self.flood(v, seen, &mut found);
+        found
+    }
+
     /// Returns the vertices of each connected component, components in the order of their lowest slot.
     pub fn component_members(&self) -> Vec<Vec<VertexId>> {
         let mut seen = vec![false; self.slots()];

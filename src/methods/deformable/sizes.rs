@@ -103,13 +103,8 @@ impl DeformableModel {
         }
         let mut is_seen = vec![false; self.mesh.slots()];
         for &v in members {
-            if is_seen[v.index()] {
-                continue;
-            }
-            // A search that stops early is within a large component.
-            let part = self.mesh.component_of(v, MOST_IN_SMALL_PART + 1);
-            part.iter().for_each(|w| is_seen[w.index()] = true);
-            if part.len() > MOST_IN_SMALL_PART {
+            let part = self.mesh.unseen_component_of(v, &mut is_seen);
+            if part.is_empty() || part.len() > MOST_IN_SMALL_PART {
                 continue;
             }
             let (volume, area) = self.volume_and_area(&part);

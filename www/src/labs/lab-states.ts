@@ -53,7 +53,7 @@ export class LabStates {
     this.#cancellable.subscribe(subscriber);
   }
 
-  /** Work can be cancelled where something was open before, or something else is to be opened. */
+  /** Cancelling opens again the data that were open before, or else the first example. */
   #offerCancel(): void {
     this.#cancellable.value = this.value === 'loading' && (this.ready || this.#hasOther);
   }
