@@ -396,8 +396,8 @@ fn a_far_target_moves_a_handle_as_far_as_a_near_one() {
         assert!(held <= 20 && (held > 0 || by < 0.07), "{by}: {held}");
         by
     };
-    let near = [0.03, 0.06, 0.1].map(|by| moved(by));
-    let far = [0.2, 0.4, 0.8, 1.6].map(|by| moved(by));
+    let near = [0.03, 0.06, 0.1].map(&moved);
+    let far = [0.2, 0.4, 0.8, 1.6].map(moved);
     println!("{near:?} {far:?}");
     let most = near.into_iter().chain(far).fold(0.0, f64::max);
     assert!(near[0] > 0.029 && far.iter().all(|by| *by > most - 0.02), "{near:?} {far:?}");

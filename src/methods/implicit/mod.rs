@@ -683,7 +683,9 @@ impl ImplicitSurface {
         let Some(mesh) = extraction.advance()? else { return Ok(Stage::Extract(extraction)) };
         self.spurious_components = extraction.spurious_components();
         let apart = 1.0 / self.in_force().density.sqrt() / self.map.scale();
-        self.unclear = extraction.unclear(&mesh, apart as f32);
+        // With constraints outside only, f is flat in many places inside.
+        let is_steep = self.sides == Some(Sides::Both);
+        self.unclear = is_steep.then(|| extraction.unclear(&mesh, apart as f32)).flatten();
         let coloring = Coloring::new(mesh.positions.len());
         Ok(Stage::Color(Box::new(ColoringState { mesh, coloring, camera: 0, points: None })))
     }
