@@ -155,8 +155,9 @@ const FREE_VOXELS = 2 ** 24;
 const VOXELS_PER_BYTE = 1000;
 /** Most bytes that a byte of RLE can stand for. */
 const RLE_RATIO = 64;
-/** Most parts of an image of JPEG 2000, each of which takes kilobytes of its decoder. */
-const MOST_TILES = 4096;
+/** Most parts of an image of JPEG 2000, which take time of its decoder, and most precincts, which take half a kilobyte each. */
+const MOST_TILES = 1024;
+const MOST_PRECINCTS = 2 ** 16;
 
 /** Throws `bad-file` unless a compressed image is as large as its file says, before a decoder allocates memory for it. */
 function checkSize({ format, file }: Frame, packed: Uint8Array): void {
@@ -168,7 +169,7 @@ function checkSize({ format, file }: Frame, packed: Uint8Array): void {
   if (isRle) return;
   const stated = statedSize(packed);
   if (!stated) throw badDicom(file.name, 'the compressed image could not be decoded: it states no size');
-  const { width, height, samples, tiles } = stated;
+  const { width, height, samples, tiles, precincts } = stated;
   if (width !== columns || height !== rows || samples !== 1)
     throw badDicom(
       file.name,
@@ -176,6 +177,8 @@ function checkSize({ format, file }: Frame, packed: Uint8Array): void {
     );
   if (!(tiles <= MOST_TILES))
     throw badDicom(file.name, `the compressed image has ${tiles} tiles; at most ${MOST_TILES}`);
+  if (!(precincts <= MOST_PRECINCTS))
+    throw badDicom(file.name, `the compressed image has ${precincts} precincts; at most ${MOST_PRECINCTS}`);
 }
 
 /** Whether a compressed image has the marker that ends images of the JPEG family, before padding. */

@@ -8,6 +8,8 @@ export interface StatedSize {
   samples: number;
   /** Number of parts that are decoded by themselves. */
   tiles: number;
+  /** Number of precincts of JPEG 2000: parts of the levels of resolution. */
+  precincts: number;
 }
 
 /** Returns the size in the header of an image of the JPEG family; undefined if it has none, or several. */
@@ -15,7 +17,7 @@ export function statedSize(bytes: Uint8Array): StatedSize | undefined {
   const at = startOfCodestream(bytes);
   if (at >= 0) return sizeOfCodestream(new DataView(bytes.buffer, bytes.byteOffset + at, bytes.length - at));
   const found = jpegSize(bytes);
-  return found && { ...found, tiles: 1 };
+  return found && { ...found, tiles: 1, precincts: 1 };
 }
 
 /** Start of the codestream of JPEG 2000 and HTJ2K: the markers SOC and SIZ (ITU-T T.800, annex A). */
@@ -39,5 +41,45 @@ function sizeOfCodestream(view: DataView): StatedSize | undefined {
   const [across, down] = [view.getUint8(43), view.getUint8(44)];
   const width = Math.ceil(right / across) - Math.ceil(left / across);
   const height = Math.ceil(bottom / down) - Math.ceil(top / down);
-  return { width, height, samples: view.getUint16(40), tiles };
+  const counts = precinctSizes(view).map((sizes) => precinctsIn(width, height, sizes));
+  const precincts = counts.reduce((most, count) => Math.max(most, count), 0);
+  return { width, height, samples: view.getUint16(40), tiles, precincts };
+}
+
+/** Markers of a codestream: how all components are coded, how one is, and the start of a part of a tile. */
+const [COD, COC, SOT] = [0xff52, 0xff53, 0xff90];
+
+/** Returns the exponents of the precincts of each level, the coarsest first, as often as they are stated. */
+function precinctSizes(view: DataView): [number, number][][] {
+  const found: [number, number][][] = [];
+  let end = 0;
+  for (let at = 2; at + 12 < view.byteLength; ) {
+    const [marker, length] = [view.getUint16(at), view.getUint16(at + 2)];
+    // A part of a tile states its length, after which the next one begins; 0 is that up to the end.
+    if (marker === SOT) end = at + view.getUint32(at + 6);
+    const levelsAt = marker === COD ? at + 9 : marker === COC ? at + 6 : undefined;
+    if (levelsAt !== undefined)
+      found.push(precinctsAt(view, levelsAt, (view.getUint8(levelsAt - (marker === COD ? 5 : 1)) & 1) === 1));
+    const isHeader = marker >= 0xff01 && marker !== 0xff93 && length >= 2;
+    const next = isHeader ? at + 2 + length : end;
+    if (next <= at) break;
+    at = next;
+  }
+  return found;
+}
+
+/** Returns the exponents of the precincts of each level, whose number is at a place; 15 where they are not stated. */
+function precinctsAt(view: DataView, at: number, isStated: boolean): [number, number][] {
+  return Array.from({ length: Math.min(view.getUint8(at), 32) + 1 }, (_, level) => {
+    const byte = isStated && at + 5 + level < view.byteLength ? view.getUint8(at + 5 + level) : 0xff;
+    return [byte & 15, byte >> 4];
+  });
+}
+
+/** Returns the number of precincts in all levels of an image. */
+function precinctsIn(width: number, height: number, sizes: readonly [number, number][]): number {
+  return sizes.reduce((sum, [wide, high], level) => {
+    const coarser = sizes.length - 1 - level;
+    return sum + Math.ceil(width / 2 ** (coarser + wide)) * Math.ceil(height / 2 ** (coarser + high));
+  }, 0);
 }

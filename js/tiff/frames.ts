@@ -4,7 +4,7 @@
 const LS = 0xf7;
 
 /** Marker of a scan, and how many there may be: decoders go through the whole image for each, of which it has some ten. */
-const [SCAN, MOST_SCANS] = [0xda, 100];
+const [SCAN, MOST_SCANS] = [0xda, 20];
 
 /** Returns the size in the header of a JPEG; undefined if it has not exactly one, or very many scans. */
 export function jpegSize(

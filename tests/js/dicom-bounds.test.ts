@@ -297,6 +297,27 @@ describe('compressed images', () => {
     }
   });
 
+  test('of JPEG 2000 with a precinct for each voxel, which would take gigabytes', async () => {
+    const size = Buffer.alloc(43);
+    size.set([0xff, 0x51, 0, 41]);
+    [2048, 2048, 0, 0, 2048, 2048].forEach((value, k) => {
+      size.writeUInt32BE(value, 6 + 4 * k);
+    });
+    size.set([0, 1, 7, 1, 1], 38);
+    const coding = [0xff, 0x52, 0, 13, 1, 0, 0, 1, 0, 0, 4, 4, 0, 1];
+    // In the main header, and in that of a part of a tile.
+    const part = [0xff, 0x90, 0, 10, 0, 0, 0, 0, 0, 0, 0, 1];
+    for (const header of [
+      [...coding, 0],
+      [...coding, 0xff, ...part, ...coding, 0],
+    ]) {
+      const image = Buffer.concat([Buffer.from([0xff, 0x4f]), size, Buffer.from(header), Buffer.alloc(60)]);
+      const sides = { rows: 2048, columns: 2048 };
+      const text = await refused(fragments([image]), sides, '1.2.840.10008.1.2.4.90');
+      expect(text).toMatch(/has 4194304 precincts; at most 65536/);
+    }
+  });
+
   test('without an end are refused by JPEG-LS, whose decoder would search it for long', async () => {
     const bytes = new Uint8Array(readFileSync('tests/data/dicom/jpeg-ls.dcm'));
     bytes[bytes.lastIndexOf(0xd9)] = 0;
