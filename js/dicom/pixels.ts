@@ -169,7 +169,8 @@ function checkSize({ format, file }: Frame, packed: Uint8Array): void {
   if (isRle) return;
   const stated = statedSize(packed);
   if (!stated) throw badDicom(file.name, 'the compressed image could not be decoded: it states no size');
-  const { width, height, samples, tiles, precincts } = stated;
+  const { width, height, samples, tiles, precincts, problem } = stated;
+  if (problem) throw badDicom(file.name, problem);
   if (width !== columns || height !== rows || samples !== 1)
     throw badDicom(
       file.name,

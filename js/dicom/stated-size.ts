@@ -1,5 +1,5 @@
 // Sizes that compressed images state, which decoders allocate memory for before they decode anything.
-import { jpegSize } from '../tiff/frames.js';
+import { jpegSize, TOO_MANY_SCANS } from '../tiff/frames.js';
 
 /** Size of an image in its own header. */
 export interface StatedSize {
@@ -10,6 +10,8 @@ export interface StatedSize {
   tiles: number;
   /** Number of precincts of JPEG 2000: parts of the levels of resolution. */
   precincts: number;
+  /** Why the image is not decoded, whatever its size. */
+  problem?: string | undefined;
 }
 
 /** Returns the size in the header of an image of the JPEG family; undefined if it has none, or several. */
@@ -17,7 +19,7 @@ export function statedSize(bytes: Uint8Array): StatedSize | undefined {
   const at = startOfCodestream(bytes);
   if (at >= 0) return sizeOfCodestream(new DataView(bytes.buffer, bytes.byteOffset + at, bytes.length - at));
   const found = jpegSize(bytes);
-  return found && { ...found, tiles: 1, precincts: 1 };
+  return found && { ...found, tiles: 1, precincts: 1, problem: found.hasManyScans ? TOO_MANY_SCANS : undefined };
 }
 
 /** Start of the codestream of JPEG 2000 and HTJ2K: the markers SOC and SIZ (ITU-T T.800, annex A). */

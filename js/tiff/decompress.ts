@@ -2,7 +2,7 @@
 import { type Page, TAG } from './directory.js';
 import { badTiff, importGeotiff } from './error.js';
 import type { Compression } from './format.js';
-import { jpegSize, zstandardFrame } from './frames.js';
+import { jpegSize, TOO_MANY_SCANS, zstandardFrame } from './frames.js';
 import { lzw } from './lzw.js';
 
 type Bytes = Uint8Array<ArrayBuffer>;
@@ -63,6 +63,7 @@ export class Decompressor {
 
   async #jpeg(stored: Bytes, { width, height, samples }: BlockSize): Promise<Bytes> {
     const found = jpegSize(stored);
+    if (found?.hasManyScans) throw badTiff(this.#page.label, TOO_MANY_SCANS);
     const isRight = found?.width === width && found.samples === samples && found.bits === 8 && found.height >= height;
     if (!isRight || width * found.height * samples > this.#ratio * stored.length) throw this.#damaged();
     const tables = await this.#page.bytes(TAG.jpegTables);

@@ -6,12 +6,20 @@ const LS = 0xf7;
 /** Marker of a scan, and how many there may be: decoders go through the whole image for each, of which it has some ten. */
 const [SCAN, MOST_SCANS] = [0xda, 20];
 
-/** Returns the size in the header of a JPEG; undefined if it has not exactly one, or very many scans. */
-export function jpegSize(
-  bytes: Uint8Array,
-): { width: number; height: number; samples: number; bits: number } | undefined {
+export interface JpegSize {
+  width: number;
+  height: number;
+  samples: number;
+  bits: number;
+}
+
+/** Problem of a JPEG of very many scans. */
+export const TOO_MANY_SCANS = `a JPEG of more than ${MOST_SCANS} scans is not decoded: it would take long`;
+
+/** Returns the size in the header of a JPEG; undefined if it has not exactly one. */
+export function jpegSize(bytes: Uint8Array): (JpegSize & { hasManyScans: boolean }) | undefined {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  const found: { width: number; height: number; samples: number; bits: number }[] = [];
+  const found: JpegSize[] = [];
   let scans = 0;
   // Markers without a length, and bytes of the image between them, are passed over.
   for (let at = 0; at + 9 < bytes.length; ) {
@@ -25,7 +33,8 @@ export function jpegSize(
     const hasLength = marker >= 0xc0 && marker < 0xff && !(marker >= 0xd0 && marker <= 0xd9);
     at += hasLength ? 2 + view.getUint16(at + 2) : 1;
   }
-  return found.length === 1 && scans <= MOST_SCANS ? found[0] : undefined;
+  const [size] = found;
+  return size && found.length === 1 ? { ...size, hasManyScans: scans > MOST_SCANS } : undefined;
 }
 
 /** Number at the start of a frame of Zstandard. */

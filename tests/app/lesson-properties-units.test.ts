@@ -94,6 +94,9 @@ const whole = (text: string, steps = [{ id: 'a' }]) =>
 test('what would keep the page busy is refused', () => {
   expect(whole(`# T\n\n## S\n${'$x$ '.repeat(600)}`).steps).toHaveLength(1);
   expect(() => whole(`# T\n\n## S\n${'$x$ '.repeat(15_000)}`)).toThrow('at most 600 formulas');
+  const matrices = `$\\begin{matrix}${'&'.repeat(960)}\\end{matrix}$ `.repeat(5);
+  expect(() => whole(`# T\n\n## S\n${matrices}`)).toThrow('at most 500 cells in all formulas');
+  expect(whole('# T\n\n## S\n$$\\begin{pmatrix} a & b \\\\ c & d \\end{pmatrix}$$').steps).toHaveLength(1);
   const row = `${'|a'.repeat(20)}|\n`;
   const table = `# T\n\n## S\n${row}${'|-'.repeat(20)}|\n${row.repeat(2_000)}`;
   expect(() => whole(table)).toThrow('at most 5000 cells of tables');

@@ -204,7 +204,7 @@ describe('small files of large images', () => {
       ...Array.from({ length: 5000 }, () => scan).flat(),
     ];
     const one = page({ 256: 768, 257: 768, 259: 7, 279: bytes.length });
-    expect(await within(1, () => refusal(file([Uint8Array.from(bytes)], one)))).toMatch(/truncated or damaged/);
+    expect(await within(1, () => refusal(file([Uint8Array.from(bytes)], one)))).toMatch(/more than 20 scans/);
   });
 });
 

@@ -128,7 +128,7 @@ export class EditPanel {
   async #open(): Promise<void> {
     if (!this.#enabled || !this.#unfolded || this.#working > 0 || this.#finishing.edited) return;
     // Controls stay enabled meanwhile: a button that is disabled while it is pressed loses the click.
-    await this.#attempt(() => this.#finishing.open(), false);
+    await this.attempt(() => this.#finishing.open(), false);
   }
 
   #operations(): HTMLElement[] {
@@ -195,7 +195,7 @@ export class EditPanel {
       for (const other of [this.#choosing, this.#measuring]) if (other !== box) other.checked = false;
       this.#view.pick(undefined);
       this.#view.showLines([]);
-      if (box.checked && (await this.#attempt(() => this.#finishing.open()))) this.#view.pick(take);
+      if (box.checked && (await this.attempt(() => this.#finishing.open()))) this.#view.pick(take);
     });
     return box;
   }
@@ -229,7 +229,7 @@ export class EditPanel {
 
   /** Changes the surface; `make` is called when it is open, as most edits depend on it. */
   async #change(kind: 'edit' | 'undo' | 'redo', make: () => Edit | undefined = () => undefined): Promise<void> {
-    await this.#attempt(async () => {
+    await this.attempt(async () => {
       await this.#finishing.open();
       await this.#finishing.change(kind, make() as never);
       const { info } = this.#finishing.edited?.measures ?? {};
@@ -242,7 +242,7 @@ export class EditPanel {
    * Does some work; controls are disabled meanwhile if it is `blocking`. An error is shown, and nothing else changes.
    * Returns whether the work was done.
    */
-  async #attempt(work: () => Promise<unknown>, blocking = true): Promise<boolean> {
+  async attempt(work: () => Promise<unknown>, blocking = true): Promise<boolean> {
     this.#error.textContent = '';
     this.#status.textContent = text('finish.working');
     const focused = document.activeElement;
@@ -294,7 +294,7 @@ export class EditPanel {
 
   async #preview(): Promise<void> {
     if (!this.#enabled || this.#blocking > 0) return;
-    await this.#attempt(async () => {
+    await this.attempt(async () => {
       await this.#finishing.open();
       this.#view.showLines(await this.#finishing.request('section', this.#plane()));
     });
@@ -308,7 +308,7 @@ export class EditPanel {
       return;
     }
     this.#view.showLines([...from.point, ...at.point]);
-    await this.#attempt(async () => {
+    await this.attempt(async () => {
       const { straight, geodesic } = await this.#finishing.request('measure', [from, at]);
       const [a, b] = [straight, geodesic].map((length) => `${figure(length)} ${this.unit}`.trim());
       this.#distance.textContent = Number.isFinite(geodesic)
@@ -322,7 +322,7 @@ export class EditPanel {
   }
 
   async #copy(): Promise<void> {
-    await this.#attempt(async () => {
+    await this.attempt(async () => {
       await navigator.clipboard.writeText(this.#code.textContent ?? '');
       this.#status.textContent = text('finish.copied');
     });

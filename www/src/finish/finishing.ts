@@ -31,6 +31,8 @@ export class Finishing {
   #edited: Edited | undefined;
   /** Whether a new worker makes edits again after the one before broke. */
   #isRepeating = false;
+  /** Number of changes under way. */
+  #changes = 0;
   /** Counts the lab's surfaces. */
   #surface = 0;
   /** The surface before the edits, as a PLY file. */
@@ -63,8 +65,13 @@ export class Finishing {
 
   async change<K extends 'edit' | 'undo' | 'redo'>(kind: K, body: Requests[K]['body']): Promise<void> {
     const surface = this.#surface;
-    const edited = await this.request(kind, body);
-    if (surface === this.#surface) this.#adopt(edited);
+    this.#changes += 1;
+    try {
+      const edited = await this.request(kind, body);
+      if (surface === this.#surface) this.#adopt(edited);
+    } finally {
+      this.#changes -= 1;
+    }
   }
 
   /**
@@ -98,10 +105,12 @@ export class Finishing {
 
   /** Forgets the edits, as the lab's surface has changed. */
   reset(): void {
+    const isChanging = this.#changes > 0;
     this.#surface += 1;
     this.#opening = undefined;
     this.initial = undefined;
     if (this.#edited) this.#adopt(undefined);
+    if (isChanging) this.cancel();
   }
 
   close(): void {

@@ -8,7 +8,7 @@ import type { Warning } from '../warnings';
 import { ReferencePanel } from './compare-panel';
 import { EditPanel } from './edit-panel';
 import type { EditedView } from './edited-view';
-import { Finishing } from './finishing';
+import { Finishing, isCancelled } from './finishing';
 import type { Edit, Edited } from './protocol';
 
 /** Parts of a lab that the tools use. */
@@ -30,6 +30,7 @@ export class Finish {
   readonly #host: FinishHost;
   readonly #finishing: Finishing;
   readonly #edits: EditPanel;
+  readonly #section: HTMLDetailsElement;
   readonly #reference: ReferencePanel;
   #values: Float32Array | undefined;
 
@@ -49,11 +50,11 @@ export class Finish {
       onSave: host.save,
       warnings: host.warnings,
     });
-    const edits = folded(text('finish.title'), this.#edits.element);
-    edits.addEventListener('toggle', () => {
-      this.#edits.unfolded = edits.open;
+    this.#section = folded(text('finish.title'), this.#edits.element);
+    this.#section.addEventListener('toggle', () => {
+      this.#edits.unfolded = this.#section.open;
     });
-    this.elements = [edits, folded(text('finish.compareTitle'), this.#reference.element)];
+    this.elements = [this.#section, folded(text('finish.compareTitle'), this.#reference.element)];
   }
 
   /** Unit of length of the surface, or empty. */
@@ -92,8 +93,20 @@ export class Finish {
 
   /** Makes edits of a session again, also those that were undone there, which can be redone then. */
   async repeat(edits: Edit[], undone: Edit[]): Promise<void> {
-    for (const edit of [...edits, ...undone]) await this.#finishing.change('edit', edit);
-    for (const _ of undone) await this.#finishing.change('undo', undefined);
+    if (edits.length + undone.length === 0) return;
+    // Shown, with *Cancel*: edits may take long.
+    this.#section.open = true;
+    const make = async () => {
+      for (const edit of [...edits, ...undone]) await this.#finishing.change('edit', edit);
+      for (const _ of undone) await this.#finishing.change('undo', undefined);
+    };
+    let failure: unknown;
+    const made = make().catch((error) => {
+      failure = error;
+      throw error;
+    });
+    const isDone = await this.#edits.attempt(() => made);
+    if (!isDone && !isCancelled(failure)) throw failure;
   }
 
   /** Forgets the edits, as the lab's surface has changed. */

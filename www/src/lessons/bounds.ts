@@ -11,6 +11,10 @@ const MOST_NESTED = 40;
 const MOST_FORMULAS = 600;
 const MOST_OF_FORMULA = 1_000;
 const MOST_OF_FORMULAS = 40_000;
+/** Most cells of formulas: typesetting 5,000 takes seconds, and a page of 40,000 two gigabytes. */
+const MOST_FORMULA_CELLS = 500;
+/** Ends of cells and rows in formulas. */
+const CELL_END = /&|\\\\|\\(?:cr|newline|tabularnewline)\b/g;
 /** Most cells of tables, as bars between them: laying out 46,000 takes ten seconds. */
 const MOST_CELLS = 5_000;
 
@@ -34,14 +38,16 @@ export function checkSteps(file: string, steps: number): void {
 /** Throws an Error if a text is too long, or has too many formulas, too long ones, or too large tables. */
 export function checkText(file: string, source: string): void {
   checkLength(file, source);
-  let [count, length] = [0, 0];
+  let [count, length, cells] = [0, 0, 0];
   for (const [formula] of source.matchAll(new RegExp(FORMULA, 'g'))) {
     count += 1;
     length += formula.length;
+    cells += formula.match(CELL_END)?.length ?? 0;
     if (formula.length > MOST_OF_FORMULA) throw tooMuch(file, text('lessons.formulaCharacters'), MOST_OF_FORMULA);
   }
   if (count > MOST_FORMULAS) throw tooMuch(file, text('lessons.formulas'), MOST_FORMULAS);
   if (length > MOST_OF_FORMULAS) throw tooMuch(file, text('lessons.formulasCharacters'), MOST_OF_FORMULAS);
+  if (cells > MOST_FORMULA_CELLS) throw tooMuch(file, text('lessons.formulaCells'), MOST_FORMULA_CELLS);
   if (source.split('|').length > MOST_CELLS) throw tooMuch(file, text('lessons.cells'), MOST_CELLS);
 }
 
