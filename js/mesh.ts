@@ -622,9 +622,9 @@ export class Mesh {
    * Entry points with one method lack it.
    *
    * @param plane - `origin`: a point on the plane. `normal`: of any length but 0.
-   * @throws {@link VesicleError} `not-closed`; `self-intersecting` if the mesh intersects itself at the plane, or parts
-   *   of it are too near each other there; `invalid-argument`, also if nothing would be left, and for the mesh of a
-   *   model: `clone()` it first. The mesh is then unchanged.
+   * @throws {@link VesicleError} `not-closed`; `self-intersecting` if the mesh intersects itself at the plane, parts
+   *   of it are too near each other there, or one is inside another that faces the same way; `invalid-argument`, also if
+   *   nothing would be left, and for the mesh of a model: `clone()` it first. The mesh is then unchanged.
    */
   cut(plane: { origin: Vec3; normal: Vec3 }): void {
     const { origin, normal } = checkProperties('plane', shallowCopy('plane', plane), ['origin', 'normal']);

@@ -28,7 +28,8 @@ pub enum MeshError {
     },
     /// A cut that would make the mesh intersect itself; the mesh is unmodified.
     #[error(
-        "the mesh cannot be cut there: it intersects itself at the plane, or parts of it are too near each other"
+        "the mesh cannot be cut there: it intersects itself at the plane, parts of it are too near each other, or one is inside \
+         another that faces the same way"
     )]
     CannotCut,
     /// Coordinates are so large, or lengths so small, that single precision can't represent the result.

@@ -29,6 +29,16 @@ pub fn intersecting_pairs(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     pairs.into_iter().map(|pair| [(pair >> 32) as u32, pair as u32]).collect()
 }
 
+/// Returns whether there is any of the [`intersecting_pairs`] for which `counts` holds; stops at the first.
+pub(crate) fn intersect_anywhere(mesh: &TriangleMesh, counts: impl Fn([u32; 2]) -> bool) -> bool {
+    let mut found = false;
+    for_each_tested_pair(mesh, |s, t, intersect| {
+        found |= intersect && counts([s, t]);
+        !found
+    });
+    found
+}
+
 /// Returns the number of self-intersections: the length of [`intersecting_pairs`], without storing the pairs.
 ///
 /// Memory is linear in the number of triangles. So is time if few bounding boxes of triangles overlap; it is quadratic

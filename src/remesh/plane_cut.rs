@@ -2,7 +2,7 @@
 
 use crate::math::predicates::{collinear, in_circle};
 use crate::math::{Bounds, DVec2, DVec3, Vec3, triangulate};
-use crate::mesh::{Mesh, MeshError, OppositeVertices, TriangleMesh, VertexId, intersecting_pairs};
+use crate::mesh::{Mesh, MeshError, OppositeVertices, TriangleMesh, VertexId, intersect_anywhere};
 use crate::spatial::lone_corner;
 use std::collections::BTreeMap;
 
@@ -33,7 +33,8 @@ pub struct Plane {
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] if the plane is not finite or its normal is 0, or nothing would be left;
-/// [`MeshError::CannotCut`] if the mesh intersects itself at the plane, or sheets are too near each other there. The
+/// [`MeshError::CannotCut`] if the mesh intersects itself at the plane, sheets are too near each other there, or a component is
+/// inside another that faces the same way. The
 /// mesh is then unchanged.
 pub fn cut_by_plane(mesh: &mut Mesh, plane: Plane) -> Result<(), MeshError> {
     let heights = plane.heights(mesh)?;
@@ -214,6 +215,6 @@ fn is_sound(mesh: &Mesh, rim_start: u32) -> bool {
     }
     triangles.retain(|corners| Bounds::from_points(&points_of(corners)).overlaps(&near));
     let surface = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
-    let is_old = |t: u32| !is_new(&surface.triangles[t as usize]);
-    intersecting_pairs(&surface).into_iter().all(|pair| pair.into_iter().all(is_old))
+    let is_of_new = |t: u32| is_new(&surface.triangles[t as usize]);
+    !intersect_anywhere(&surface, |pair| pair.into_iter().any(is_of_new))
 }
