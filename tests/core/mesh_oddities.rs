@@ -454,7 +454,7 @@ fn a_small_file_does_not_become_a_huge_mesh() {
     let file = shared_mesh(5000, 560);
     assert!(file.len() < 100_000);
     let error = refusal(&file);
-    assert!(error.starts_with("GLB: nodes: needs 235200000 bytes"), "{error}");
+    assert!(error.starts_with("GLB: nodes") && error.contains("needs 235200000 bytes"), "{error}");
     // As much as a scene with repeated parts may need.
     let mesh = parse_mesh(&shared_mesh(40, 560)).unwrap();
     assert_eq!((mesh.positions.len(), mesh.triangles.len()), (1680, 40 * 560));

@@ -392,8 +392,8 @@ fn a_far_target_moves_a_handle_as_far_as_a_near_one() {
         let held = model.detail_counts()[1];
         back_to(&mut model, &start);
         assert_eq!(model.detail_counts()[1], 0);
-        // Those that would have intersected others were held back.
-        assert!(held <= 20 && (held > 0 || by < 0.07), "{by}: {held}");
+        // Those that would have intersected others were held back: a few.
+        assert!(20 * held < dumbbell.positions.len() && (held > 0 || by < 0.07), "{by}: {held}");
         by
     };
     let near = [0.03, 0.06, 0.1].map(&moved);
