@@ -1,7 +1,7 @@
 // How much files may unpack to: a few kilobytes can stand for gigabytes of equal voxels, and methods take many times that.
 
 /** Bytes of files that are small, all together, and the most bytes that they may unpack to. */
-const SMALL = 2 ** 17;
+export const SMALL = 2 ** 17;
 const MOST_OF_SMALL = 2 ** 25;
 
 /** Most bytes that a byte of larger files may unpack to. */

@@ -59,9 +59,8 @@ function precinctSizes(view: DataView): [number, number][][] {
     const [marker, length] = [view.getUint16(at), view.getUint16(at + 2)];
     // A part of a tile states its length, after which the next one begins; 0 is that up to the end.
     if (marker === SOT) end = at + view.getUint32(at + 6);
-    const levelsAt = marker === COD ? at + 9 : marker === COC ? at + 6 : undefined;
-    if (levelsAt !== undefined)
-      found.push(precinctsAt(view, levelsAt, (view.getUint8(levelsAt - (marker === COD ? 5 : 1)) & 1) === 1));
+    if (marker === COD) found.push(precinctsAt(view, at + 9, view.getUint8(at + 4)));
+    if (marker === COC) found.push(precinctsAt(view, at + 6, view.getUint8(at + 5)));
     const isHeader = marker >= 0xff01 && marker !== 0xff93 && length >= 2;
     const next = isHeader ? at + 2 + length : end;
     if (next <= at) break;
@@ -70,8 +69,12 @@ function precinctSizes(view: DataView): [number, number][][] {
   return found;
 }
 
-/** Returns the exponents of the precincts of each level, whose number is at a place; 15 where they are not stated. */
-function precinctsAt(view: DataView, at: number, isStated: boolean): [number, number][] {
+/**
+ * Returns the exponents of the precincts of each level, whose number is at a place; 15 where they are not stated, as the
+ * lowest bit of the style says.
+ */
+function precinctsAt(view: DataView, at: number, style: number): [number, number][] {
+  const isStated = (style & 1) === 1;
   return Array.from({ length: Math.min(view.getUint8(at), 32) + 1 }, (_, level) => {
     const byte = isStated && at + 5 + level < view.byteLength ? view.getUint8(at + 5 + level) : 0xff;
     return [byte & 15, byte >> 4];

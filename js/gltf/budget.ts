@@ -1,4 +1,5 @@
 // How much the parts of a document may decode to.
+import { isSmall } from '../small-files.js';
 import { tooLarge } from './error.js';
 import { entry, type Json, object, objects } from './json.js';
 
@@ -8,12 +9,12 @@ const LIMIT = 1 << 27;
 /** Number of decoded bytes for each byte of the file that may always be made: few meshes are compressed so well. */
 const GROWTH = 64;
 
-/** Bytes of files that are small, and the most that these may decode to: twice as much as for the best compressed. */
-const [SMALL, LIMIT_OF_SMALL] = [1 << 17, 1 << 24];
+/** Number of bytes that small files may decode to: twice as much as for the best compressed. */
+const LIMIT_OF_SMALL = 1 << 24;
 
 /** Returns the largest number of bytes that files of a given size may decode to. */
 const limitOf = (fileBytes: number): number =>
-  fileBytes <= SMALL ? LIMIT_OF_SMALL : Math.max(LIMIT, fileBytes * GROWTH);
+  isSmall(fileBytes) ? LIMIT_OF_SMALL : Math.max(LIMIT, fileBytes * GROWTH);
 
 /** Returns a function that counts bytes before they are made; it throws `too-large` where all are far more than the file. */
 export function budgetOf(fileBytes: number): (bytes: number, field: string) => void {

@@ -2,6 +2,7 @@
 import type { AsyncReadable, GetOptions, RangeQuery, Readable } from '@zarrita/storage';
 import { onAbort } from '../abort.js';
 import { VesicleError } from '../error.js';
+import { isSmall, SMALL } from '../small-files.js';
 import { badZarr, RefusedError, tooLarge } from './error.js';
 
 /** Duration of the pause before the first repetition, milliseconds; each later one is twice as long. */
@@ -44,10 +45,10 @@ const MOST_METADATA = 2 ** 22;
 const MOST_NESTED = 200;
 
 /**
- * Stored bytes of chunks that are small, and the most bytes that these may decode to: a constant chunk of 256 × 256 × 256
- * floats. Decoders and what comes after them take up to four times the bytes of a chunk.
+ * Most bytes that a chunk of few stored bytes may decode to: a constant one of 256 × 256 × 256 floats. Decoders and what
+ * comes after them take up to four times the bytes of a chunk.
  */
-const [SMALL_CHUNK, MOST_OF_SMALL_CHUNK] = [2 ** 17, 2 ** 26];
+const MOST_OF_SMALL_CHUNK = 2 ** 26;
 
 /** How a file is asked for. Stores get the same, and heed what they know. */
 export interface FileOptions extends GetOptions {
@@ -69,10 +70,10 @@ export function checkLength(key: string, length: number, most: number): void {
 
 /** Throws `too-large` for few bytes that decode to very many. */
 function checkDecoded(key: string, stored: number, decoded: number): void {
-  if (stored > SMALL_CHUNK || decoded <= MOST_OF_SMALL_CHUNK) return;
+  if (!isSmall(stored) || decoded <= MOST_OF_SMALL_CHUNK) return;
   throw tooLarge(
     key,
-    `${stored} bytes would decode to ${decoded}; chunks that are stored in up to ${SMALL_CHUNK / 2 ** 10} KiB may ` +
+    `${stored} bytes would decode to ${decoded}; chunks that are stored in up to ${SMALL / 2 ** 10} KiB may ` +
       `decode to ${MOST_OF_SMALL_CHUNK / 2 ** 20} MiB: store the image in smaller chunks`,
   );
 }

@@ -109,20 +109,18 @@ impl Volume {
         pauses: &Pauses,
     ) -> Result<Voxels, VolumeError> {
         let dims = self.dims();
-        let slices = Slices::new(dims, axis);
         let start = self.frame_start(frame)?;
         let mut longer = dims;
         longer[axis] = (dims[axis] - 1) * factor + 1;
-        let out = Slices::new(longer, axis);
-        let mut voxels = self.voxels.zeros_like(longer[0] * longer[1] * longer[2])?;
-        let given = |slice| slices.voxel_indices(slice).map(move |index| start + index..start + index + 1);
+        let mut voxels = self.voxels.zeros_like(longer.iter().product())?;
         let mut put = |slice, made: &Voxels| {
-            voxels.overwrite(out.voxel_indices(slice).map(|index| index..index + 1), made);
+            voxels.overwrite(slice_at(longer, axis, slice).rows(longer, 0), made);
         };
         let mut before = self.normalised_slice(frame, axis, 0)?;
         for slice in 0..dims[axis] {
             pauses.now().await;
-            put(slice * factor, &self.voxels.gathered(slices.pixels(), given(slice))?);
+            let given = slice_at(dims, axis, slice);
+            put(slice * factor, &self.voxels.gathered(given.len(), given.rows(dims, start))?);
             if slice + 1 == dims[axis] {
                 break;
             }
@@ -139,7 +137,7 @@ impl Volume {
                 pauses.now().await;
                 let image = in_between(&before, &after, flow.as_ref(), step as f32 / factor as f32)?;
                 pauses.now().await;
-                let mut made = reserve(slices.pixels())?;
+                let mut made = reserve(given.len())?;
                 made.extend(image.values.iter().map(|&value| self.stored(f64::from(value))));
                 put(slice * factor + step, &self.voxels.like(&made)?);
             }
@@ -150,11 +148,9 @@ impl Volume {
 
     /// Returns a slice as an image. The flow is computed on normalised intensities, which are finite even for NaN voxels.
     fn normalised_slice(&self, frame: usize, axis: usize, slice: usize) -> Result<Image, VolumeError> {
-        let (mut min, mut dims) = ([0; 3], self.dims());
-        (min[axis], dims[axis]) = (slice, 1);
-        let values = self.normalised_region(Region { min, dims }, frame)?.values;
-        let Slices { across: width, down: height, .. } = Slices::new(self.dims(), axis);
-        Ok(Image { width, height, values })
+        let region = slice_at(self.dims(), axis, slice);
+        let [width, height] = [[1, 2], [0, 2], [0, 1]][axis].map(|side| region.dims[side]);
+        Ok(Image { width, height, values: self.normalised_region(region, frame)?.values })
     }
 
     /// Converts an intensity on the scale of [`Self::normalised_grid`] (0 to 1) to a stored value.
@@ -163,37 +159,11 @@ impl Volume {
     }
 }
 
-/// Memory layout of the slices of a volume perpendicular to one axis, for slice interpolation.
-struct Slices {
-    /// Number of voxels along the lower one of the two axes within a slice (in the order x, y, z).
-    across: usize,
-    /// Number of voxels along the higher one of the two axes within a slice (in the order x, y, z).
-    down: usize,
-    /// Memory strides, in voxels, of the lower and the higher axis within a slice and of the axis across slices.
-    steps: [usize; 3],
-}
-
-impl Slices {
-    fn new(dims: [usize; 3], axis: usize) -> Self {
-        let strides = [1, dims[0], dims[0] * dims[1]];
-        let (across, down) = [(1, 2), (0, 2), (0, 1)][axis];
-        Self {
-            across: dims[across],
-            down: dims[down],
-            steps: [strides[across], strides[down], strides[axis]],
-        }
-    }
-
-    /// Returns the indices, within a frame, of the voxels of slice number `slice`, row by row.
-    fn voxel_indices(&self, slice: usize) -> impl Iterator<Item = usize> + use<> {
-        let Self { across, down, steps: [step, row, along] } = *self;
-        (0..down).flat_map(move |y| (0..across).map(move |x| slice * along + y * row + x * step))
-    }
-
-    /// Returns the number of voxels of a slice.
-    fn pixels(&self) -> usize {
-        self.across * self.down
-    }
+/// Returns a slice across an axis of a volume of `dims` voxels.
+fn slice_at(mut dims: [usize; 3], axis: usize, slice: usize) -> Region {
+    let mut min = [0; 3];
+    (min[axis], dims[axis]) = (slice, 1);
+    Region { min, dims }
 }
 
 /// Multiplies the flow between two images at each pixel by its confidence: the share of the squared difference of the

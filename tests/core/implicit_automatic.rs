@@ -204,7 +204,7 @@ fn a_cell_that_does_not_suit_the_points_is_refused_in_words() {
     }
 }
 
-/// Also after other edits, those of a saved run, and so many that the system is solved from scratch.
+/// Before or after other edits, in a restored run, and beyond the number of edits for which the system is revised.
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn edits_give_the_same_bits_whenever_they_are_made() {

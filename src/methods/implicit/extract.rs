@@ -154,9 +154,9 @@ impl Extraction {
         }
     }
 
-    /// Returns the vertex of the finished surface `mesh` where the function separates inside and outside least clearly, if that is
-    /// hardly at all and a point is within `reach`: sheets that the points leave in doubt may be joined there. Elsewhere,
-    /// between points, the function may be flat.
+    /// Returns the vertex of the finished surface `mesh` with the least gradient, if that is below [`UNCLEAR`] and a point is
+    /// within `reach`: inside and outside are hardly distinguished there, so that two sheets may be joined wrongly. Far from
+    /// all points, the function may be flat.
     pub fn unclear(&self, mesh: &TriangleMesh, reach: f32) -> Option<Vec3> {
         let least = UNCLEAR * median(self.slopes.iter().copied())?;
         let flat = mesh.positions.iter().zip(&self.slopes).filter(|(_, slope)| **slope < least);

@@ -192,7 +192,7 @@ impl Held {
         let gripped = gripped(&pose, walker);
         let ids: Vec<VertexId> = now.mesh.vertices().collect();
         let at_grip = gripped.iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        let motion = at_grip.and_then(|&(v, _)| self.motion_of(now, ids[v as usize]));
+        let motion = at_grip.and_then(|&(v, _)| self.motion_of(&now.distances, ids[v as usize]));
         let rest = motion.map_or(pose, |motion| pose_before(&pose, &motion));
         let (reach, found) = self.effect_of(&rest, distances_from(&gripped, now), now);
         let mut handle = Handle::at_rest(rest, reach);
@@ -213,25 +213,22 @@ impl Held {
         self.handles.truncate(count);
     }
 
-    fn target(&self, now: &Placed, v: VertexId) -> Vec3 {
-        let p = now.points[v.index()].point;
-        self.motion_of(now, v).map_or(p, |motion| motion.of(p.as_dvec3()).as_vec3())
+    /// Returns where the handles move a vertex, given its place on the surface and the distances of all from the handles.
+    fn target(&self, points: &Correspondence, distances: &[f32], v: VertexId) -> Vec3 {
+        let p = points[v.index()].point;
+        self.motion_of(distances, v).map_or(p, |motion| motion.of(p.as_dvec3()).as_vec3())
     }
 
-    fn motion_of(&self, now: &Placed, v: VertexId) -> Option<Motion> {
+    fn motion_of(&self, distances: &[f32], v: VertexId) -> Option<Motion> {
         let count = self.handles.len();
-        motion_at(&self.handles, &now.distances[v.index() * count..][..count])
+        motion_at(&self.handles, &distances[v.index() * count..][..count])
     }
 
     /// Returns the number of vertices of a surface with the given places that are not where the handles move them: they would
     /// have intersected others.
     pub fn held_vertices(&self, surface: &Mesh, points: &Correspondence) -> usize {
-        let count = self.handles.len();
-        let is_held = |v: &VertexId| {
-            let (p, distances) = (points[v.index()].point, &self.distances[v.index() * count..][..count]);
-            let target =
-                motion_at(&self.handles, distances).map_or(p, |motion| motion.of(p.as_dvec3()).as_vec3());
-            surface.position(*v).distance(target) > MISSED * self.edge
+        let is_held = |&v: &VertexId| {
+            surface.position(v).distance(self.target(points, &self.distances, v)) > MISSED * self.edge
         };
         surface.vertices().filter(is_held).count()
     }
@@ -307,8 +304,9 @@ impl Held {
         longest: f32,
         most: usize,
     ) -> Option<(usize, f64)> {
-        let targets: Vec<Vec3> =
-            (0..now.mesh.slots()).map(|i| self.target(now, VertexId::from_index(i))).collect();
+        let targets: Vec<Vec3> = (0..now.mesh.slots())
+            .map(|i| self.target(&now.points, &now.distances, VertexId::from_index(i)))
+            .collect();
         let mut displacements = displacements_to(&now.mesh, &targets);
         guard.sync_with_edge(&now.mesh, self.edge);
         self.crossings.exempt_from(guard, &now.points);

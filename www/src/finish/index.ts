@@ -100,13 +100,11 @@ export class Finish {
       for (const edit of [...edits, ...undone]) await this.#finishing.change('edit', edit);
       for (const _ of undone) await this.#finishing.change('undo', undefined);
     };
-    let failure: unknown;
-    const made = make().catch((error) => {
-      failure = error;
-      throw error;
+    const made = make();
+    if (await this.#edits.attempt(() => made)) return;
+    await made.catch((error) => {
+      if (!isCancelled(error)) throw error;
     });
-    const isDone = await this.#edits.attempt(() => made);
-    if (!isDone && !isCancelled(failure)) throw failure;
   }
 
   /** Forgets the edits, as the lab's surface has changed. */

@@ -91,8 +91,9 @@ export class LabStates {
 
   /**
    * Prepares for opening other data: enters the loading state, with `text` in the status line, and waits until queued
-   * changes are complete. `hasOther` tells whether a lab that has no data yet could open something else instead. Until {@link finishOpening} is called, the present model's state is recorded, but not
-   * displayed.
+   * changes are complete. Until {@link finishOpening} is called, the present model's state is recorded, but not displayed.
+   *
+   * @param hasOther - Whether a lab that has no data yet could open something else instead.
    */
   async open(text: string, hasOther: boolean): Promise<void> {
     this.#opening = true;
