@@ -83,6 +83,9 @@ struct Inflated {
 /// little whatever size its header claims.
 const INITIAL_CAPACITY: usize = 1 << 16;
 
+/// The largest ratio of inflated bytes to deflated ones.
+const MOST_INFLATED: usize = 1032;
+
 /// Inflates one deflate stream, in a zlib container if `zlib`, and appends its content to `out`, which becomes at most
 /// one byte longer than `limit`.
 fn inflate(
@@ -104,6 +107,9 @@ fn inflate(
     let (mut consumed, mut written) = (0, 0);
     let most = limit.saturating_add(1);
     let mut capacity = INITIAL_CAPACITY;
+    // What it may become is reserved, as moving a doubled buffer needs room for both. Without it, doubling may do.
+    let reserved = most.saturating_sub(start).min(input.len().saturating_mul(MOST_INFLATED));
+    let _ = out.try_reserve_exact(reserved);
     loop {
         grow(format, out, capacity.saturating_add(start).min(most))?;
         let (status, read, wrote) =

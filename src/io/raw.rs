@@ -3,6 +3,7 @@
 use super::FormatError;
 use crate::volume::{LengthUnit, Volume, VolumeError, VolumeInit, Voxels};
 use crate::warning::Warning;
+use std::borrow::Cow;
 
 /// Number type of the voxels in a volume file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,34 +67,48 @@ pub(super) fn payload_size(name: FieldName, dims: [usize; 4], scalar: Scalar) ->
     Err(FormatError::too_large(name.format, name.field, needed))
 }
 
-/// Returns the first `needed` of the bytes of voxel data, those that hold the voxels.
+/// Returns the first `needed` of the bytes of voxel data, those that hold the voxels, without a copy.
 ///
 /// # Errors
 /// Fewer bytes than `needed`, or more than [`MAX_PADDING`] beyond it, or as many again that are not padding: header and
 /// payload then do not match.
-pub(super) fn payload(name: FieldName, bytes: &[u8], needed: usize) -> Result<&[u8], FormatError> {
-    let Some(payload) = bytes.get(..needed) else {
+pub(super) fn payload(
+    name: FieldName,
+    bytes: Cow<'_, [u8]>,
+    needed: usize,
+) -> Result<Cow<'_, [u8]>, FormatError> {
+    let Some(rest) = bytes.get(needed..) else {
         return Err(FormatError::truncated(name.format, name.field, needed, bytes.len()));
     };
-    let rest = &bytes[needed..];
     if rest.len() > MAX_PADDING || rest.len() >= needed && rest.iter().any(|&byte| byte != 0) {
         let problem = format!("{} bytes of voxels, the header accounts for {needed}", bytes.len());
         return Err(FormatError::invalid(name.format, name.field, problem));
     }
-    Ok(payload)
+    Ok(match bytes {
+        Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[..needed]),
+        Cow::Owned(mut bytes) => {
+            bytes.truncate(needed);
+            Cow::Owned(bytes)
+        }
+    })
 }
 
 /// Decodes the voxels in `bytes`, whose length is a multiple of the size of a number. 64-bit integers become 32-bit ones
-/// if all of them fit, so that they may be labels, else `f64`. `big` means big-endian.
+/// if all of them fit, so that they may be labels, else `f64`. `big` means big-endian. Bytes that are owned are not copied
+/// if they are the voxels.
 ///
 /// # Errors
 /// A 64-bit integer beyond ±2⁵³, which `f64` may not represent exactly; not enough memory.
 pub(super) fn decode(
     name: FieldName,
-    bytes: &[u8],
+    bytes: Cow<'_, [u8]>,
     scalar: Scalar,
     big: bool,
 ) -> Result<Voxels, FormatError> {
+    let bytes = match bytes {
+        Cow::Owned(bytes) if scalar == Scalar::U8 => return Ok(Voxels::U8(bytes)),
+        ref bytes => &bytes[..],
+    };
     Ok(match scalar {
         Scalar::U8 => Voxels::U8(numbers(name, bytes, |[b]| b)?),
         Scalar::I8 => Voxels::I8(numbers(name, bytes, i8::from_ne_bytes)?),
@@ -291,7 +306,7 @@ mod tests {
     fn integers_of_64_bits_become_shorter_ones_if_all_fit() {
         let decoded = |values: [i64; 2], scalar, big| {
             let bytes = values.map(|value| if big { value.to_be_bytes() } else { value.to_le_bytes() });
-            decode(NAME, bytes.as_flattened(), scalar, big)
+            decode(NAME, Cow::Borrowed(bytes.as_flattened()), scalar, big)
         };
         let (least, most) = (i64::from(i32::MIN), i64::from(u32::MAX));
         for big in [false, true] {

@@ -53,13 +53,13 @@ impl Source<'_> {
         size: usize,
         all: impl FnOnce(&[u8]) -> Result<Voxels, FormatError>,
         part: impl for<'b> Fn(&'b [u8], usize) -> Result<Cow<'b, [u8]>, FormatError>,
-        decode: impl FnOnce(&[u8]) -> Result<Voxels, FormatError>,
+        decode: impl FnOnce(Cow<'_, [u8]>) -> Result<Voxels, FormatError>,
     ) -> Result<Voxels, FormatError> {
         match self {
             Self::Bytes(bytes) => all(bytes),
             Self::Files(files, found) => match &found[..] {
                 [one] => with_file(*files, one, all),
-                several => decode(&joined(format, *files, several, size, part)?),
+                several => decode(Cow::Owned(joined(format, *files, several, size, part)?)),
             },
         }
     }

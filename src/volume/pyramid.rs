@@ -7,7 +7,7 @@
 //! are interpolated linearly; the border is replicated.
 
 use super::derived::Derivation;
-use super::error::{VolumeError, reserve};
+use super::error::{VolumeError, filled, reserve};
 use super::sampling::locate_f64;
 use super::voxels::Voxels;
 use super::{Grid, Region, Volume, VolumeInit};
@@ -37,47 +37,55 @@ impl Volume {
         let mut spacing = self.spacing();
         let mut unit = smallest(spacing);
         let shift = self.pyramid_shift();
-        let mut here: Vec<Grid> = Vec::new();
         let mut out = vec![self.clone()];
         while out.len() < levels {
-            let from = here.first().map_or(self.dims(), |grid| grid.dims);
-            let next = if here.is_empty() {
-                let frames = 0..self.frames();
-                frames
-                    .map(|t| self.reduced_frame(t, shift, spacing, [unit, factor]))
-                    .collect::<Result<_, _>>()?
+            let finer = &out[out.len() - 1];
+            let level = if out.len() == 1 {
+                self.level_after(
+                    finer,
+                    |voxels| self.intensities_above(shift, voxels),
+                    spacing,
+                    [unit, factor],
+                )
             } else {
-                let reduced = here.iter().map(|grid| Ok(grid.reduce(spacing, unit, factor)?.0));
-                reduced.collect::<Result<Vec<Grid>, VolumeError>>()?
-            };
-            out.push(self.level(&next, shift)?);
-            spacing = spacing_of(spacing, from, reduced_dims(from, factor));
-            (here, unit) = (next, unit * factor);
+                self.level_after(finer, |voxels| finer.voxels.as_f32(voxels), spacing, [unit, factor])
+            }?;
+            spacing = spacing_of(spacing, finer.dims(), level.dims());
+            unit *= factor;
+            out.push(level);
         }
         Ok(out)
     }
 
-    /// Returns what [`Grid::reduce`] makes of the intensities of a frame less `shift`; slice by slice, as intensities in
-    /// single precision may take four times as much memory as the volume.
-    fn reduced_frame(
+    /// Returns the next coarser level than `finer`, with the same world box as this volume; `values` returns the intensities
+    /// of `finer` less the shift of the pyramid. A slice at a time is converted: in single precision, all may take four
+    /// times as much memory as the volume.
+    fn level_after(
         &self,
-        frame: usize,
-        shift: f64,
+        finer: &Volume,
+        values: impl Fn(Range<usize>) -> Result<Vec<f32>, VolumeError>,
         spacing: [f64; 3],
         steps: [f64; 2],
-    ) -> Result<Grid, VolumeError> {
-        let [nx, ny, nz] = self.dims();
-        let [x, y, z] = reduction(self.dims(), [true; 3], spacing, steps)?;
-        let dims = [x.spans.len(), y.spans.len(), nz];
-        let mut along_xy = Grid { dims, values: reserve(dims.iter().product())? };
-        for slice in 0..nz {
-            let start = self.frame_start(frame)? + slice * nx * ny;
-            let values = self.intensities_above(shift, start..start + nx * ny)?;
-            let slice = Grid { dims: [nx, ny, 1], values };
-            let reduced = slice.resample_x(&x, dims[0])?.resample_rows(&y, dims[1], 1)?;
-            along_xy.values.extend_from_slice(&reduced.values);
+    ) -> Result<Volume, VolumeError> {
+        let taps = reduction(finer.dims(), [true; 3], spacing, steps)?;
+        let dims = [0, 1, 2].map(|axis| taps[axis].spans.len());
+        let (size, [nx, ny, nz]) = (dims.iter().product(), finer.dims());
+        let mut voxels = filled(self.frames() * size, 0.0)?;
+        for (frame, out) in voxels.chunks_exact_mut(size).enumerate() {
+            let slice = |z| values((frame * nz + z) * nx * ny..(frame * nz + z + 1) * nx * ny);
+            resample(finer.dims(), &taps, slice, out)?;
         }
-        along_xy.resample_rows(&z, z.spans.len(), 2)
+        let ratio = DVec3::from([0, 1, 2].map(|axis| self.dims[axis] as f64 / dims[axis] as f64));
+        let index_map =
+            DAffine3 { matrix3: DMat3::from_diagonal(ratio), translation: (ratio - DVec3::ONE) * 0.5 };
+        let volume = Volume::new(VolumeInit {
+            affine: self.affine * index_map,
+            frame_seconds: self.frame_seconds,
+            space: self.space,
+            intercept: self.pyramid_shift(),
+            ..VolumeInit::new(Voxels::F32(voxels), [dims[0], dims[1], dims[2], self.frames()])
+        })?;
+        Ok(volume.derived(self, Derivation::Averaged))
     }
 
     /// Returns the largest number of levels, this volume included, of a pyramid with the reduction factor `factor` in
@@ -114,27 +122,6 @@ impl Volume {
         let [low, high] = self.range;
         if self.span() < low.abs().max(high.abs()) / COARSEST_SPAN { low } else { 0.0 }
     }
-
-    /// Builds the volume of one pyramid level from its frames, whose intensities are less by `shift`, filling the same
-    /// world box as this volume.
-    fn level(&self, frames: &[Grid], shift: f64) -> Result<Volume, VolumeError> {
-        let dims = frames[0].dims;
-        let ratio = DVec3::from([0, 1, 2].map(|axis| self.dims[axis] as f64 / dims[axis] as f64));
-        let index_map =
-            DAffine3 { matrix3: DMat3::from_diagonal(ratio), translation: (ratio - DVec3::ONE) * 0.5 };
-        let mut values = reserve(frames.len() * frames[0].values.len())?;
-        for frame in frames {
-            values.extend_from_slice(&frame.values);
-        }
-        let volume = Volume::new(VolumeInit {
-            affine: self.affine * index_map,
-            frame_seconds: self.frame_seconds,
-            space: self.space,
-            intercept: shift,
-            ..VolumeInit::new(Voxels::F32(values), [dims[0], dims[1], dims[2], frames.len()])
-        })?;
-        Ok(volume.derived(self, Derivation::Averaged))
-    }
 }
 
 impl Grid {
@@ -162,10 +149,9 @@ impl Grid {
         unit: f64,
         factor: f64,
     ) -> Result<(Grid, [f64; 3]), VolumeError> {
-        let taps = reduction(self.dims, axes, spacing, [unit, factor])?;
-        let dims = [0, 1, 2].map(|axis| taps[axis].spans.len());
-        let coarse = self.resample(&taps, dims)?;
-        Ok((coarse, spacing_of(spacing, self.dims, dims)))
+        let coarse = self.resample(&reduction(self.dims, axes, spacing, [unit, factor])?)?;
+        let spacing = spacing_of(spacing, self.dims, coarse.dims);
+        Ok((coarse, spacing))
     }
 
     /// Updates `coarse`, which [`Self::reduce`] returned for this grid and the same `spacing`, `unit` and `factor`,
@@ -208,52 +194,62 @@ impl Grid {
             dims: ranges.map(|range| range.len()),
         };
         let (to, from) = (region(to), region(from));
-        let part = self.part(from)?.resample(&[x.weights, y.weights, z.weights], to.dims)?;
+        let part = self.part(from)?.resample(&[x.weights, y.weights, z.weights])?;
         coarse.overwrite(to, &part);
         Ok(Some(to))
     }
 
-    fn resample(&self, taps: &[ResamplingWeights; 3], dims: [usize; 3]) -> Result<Grid, VolumeError> {
-        let along_x = self.resample_x(&taps[0], dims[0])?;
-        let along_xy = along_x.resample_rows(&taps[1], dims[1], 1)?;
-        along_xy.resample_rows(&taps[2], dims[2], 2)
-    }
-
-    fn resample_x(&self, taps: &ResamplingWeights, nx: usize) -> Result<Grid, VolumeError> {
-        let mut values = reserve(nx * self.dims[1] * self.dims[2])?;
-        for row in self.values.chunks_exact(self.dims[0]) {
-            values.extend((0..nx).map(|i| {
-                let (first, weights) = taps.of(i);
-                weights.iter().zip(&row[first..]).fold(0.0, |sum, (w, v)| sum + w * v)
-            }));
-        }
-        Ok(Grid { dims: [nx, self.dims[1], self.dims[2]], values })
-    }
-
-    /// Resamples the grid to `count` voxels along y (`axis` 1) or z (`axis` 2) with the weights `taps`, blending whole
-    /// runs of contiguous values at once.
-    fn resample_rows(
-        &self,
-        taps: &ResamplingWeights,
-        count: usize,
-        axis: usize,
-    ) -> Result<Grid, VolumeError> {
-        let run = if axis == 1 { self.dims[0] } else { self.dims[0] * self.dims[1] };
-        let mut dims = self.dims;
-        dims[axis] = count;
-        let mut values = reserve(dims[0] * dims[1] * dims[2])?;
-        for block in self.values.chunks_exact(run * self.dims[axis]) {
-            for i in 0..count {
-                let start = values.len();
-                values.resize(start + run, 0.0);
-                let (first, weights) = taps.of(i);
-                for (k, &weight) in weights.iter().enumerate() {
-                    let source = &block[(first + k) * run..(first + k + 1) * run];
-                    add_scaled(&mut values[start..], source, weight);
-                }
-            }
-        }
+    fn resample(&self, taps: &[ResamplingWeights; 3]) -> Result<Grid, VolumeError> {
+        let dims = [0, 1, 2].map(|axis| taps[axis].spans.len());
+        let size = self.dims[0] * self.dims[1];
+        let mut values = filled(dims.iter().product(), 0.0)?;
+        resample(self.dims, taps, |slice| Ok(&self.values[slice * size..][..size]), &mut values)?;
         Ok(Grid { dims, values })
+    }
+}
+
+/// Resamples a grid of `dims`, whose slices across z `slice` returns, with the weights `taps`, and adds the result to `out`.
+/// A slice at a time is resampled along x and y, and added to those of the result that depend on it: all of them at once
+/// would take more memory than the grid.
+fn resample<S: AsRef<[f32]>>(
+    dims: [usize; 3],
+    [x, y, z]: &[ResamplingWeights; 3],
+    slice: impl Fn(usize) -> Result<S, VolumeError>,
+    out: &mut [f32],
+) -> Result<(), VolumeError> {
+    let size = x.spans.len() * y.spans.len();
+    let (mut along_x, mut along_xy) = (reserve(x.spans.len() * dims[1])?, reserve(size)?);
+    for k in 0..dims[2] {
+        along_x.clear();
+        resample_rows(slice(k)?.as_ref(), dims[0], x, &mut along_x);
+        along_xy.clear();
+        blend_rows(&along_x, x.spans.len(), y, &mut along_xy);
+        for (i, weight) in z.depending_on(k) {
+            add_scaled(&mut out[i * size..], &along_xy, weight);
+        }
+    }
+    Ok(())
+}
+
+/// Resamples each of the rows of `nx` values with the weights `taps`, and appends the result to `out`.
+fn resample_rows(values: &[f32], nx: usize, taps: &ResamplingWeights, out: &mut Vec<f32>) {
+    for row in values.chunks_exact(nx) {
+        out.extend((0..taps.spans.len()).map(|i| {
+            let (first, weights) = taps.of(i);
+            weights.iter().zip(&row[first..]).fold(0.0, |sum, (w, v)| sum + w * v)
+        }));
+    }
+}
+
+/// Blends rows of `nx` values with the weights `taps`, and appends the resulting rows to `out`.
+fn blend_rows(values: &[f32], nx: usize, taps: &ResamplingWeights, out: &mut Vec<f32>) {
+    for i in 0..taps.spans.len() {
+        let start = out.len();
+        out.resize(start + nx, 0.0);
+        let (first, weights) = taps.of(i);
+        for (row, &weight) in values.chunks_exact(nx).skip(first).zip(weights) {
+            add_scaled(&mut out[start..], row, weight);
+        }
     }
 }
 
@@ -330,6 +326,14 @@ impl ResamplingWeights {
     fn of(&self, i: usize) -> (usize, &[f32]) {
         let (first, start, end) = self.spans[i];
         (first, &self.weights[start..end])
+    }
+
+    /// Returns the output voxels that depend on source voxel `k`, each with the weight of that.
+    fn depending_on(&self, k: usize) -> impl Iterator<Item = (usize, f32)> {
+        // Both ends of the spans increase with the output voxel.
+        let first = self.spans.partition_point(|&(first, start, end)| first + (end - start) <= k);
+        let spans = self.spans[first..].iter().take_while(move |&&(first, ..)| first <= k);
+        spans.enumerate().map(move |(i, &(from, start, _))| (first + i, self.weights[start + k - from]))
     }
 
     /// Returns the weights of the output voxels that depend on a source voxel in `changed`, which is not empty; `None`

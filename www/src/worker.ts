@@ -124,9 +124,9 @@ class Session {
   async #load({ name, source, setup, frame, saved }: Requests['load']['body'], signal: AbortSignal): Promise<Loaded> {
     await this.#pause();
     if ('zarr' in source) return this.#loadLarge(name, source, setup, signal);
-    const { volume, frames, unit } = await openFrame(source, frame);
+    const { volume, frames, unit, voxels } = await openFrame(source, frame);
     try {
-      const view: VolumeView = { ...viewOf(volume, name), ...displayOf(source), frames, ...(unit && { unit }) };
+      const view: VolumeView = { ...viewOf(volume, name, voxels), ...displayOf(source), frames, ...(unit && { unit }) };
       const fitting = fittingSetup(setup, volume);
       const model = saved ? restoredModel(volume, saved) : buildModel(volume, fitting);
       // No checks of a new model: the page starts the run at once, and would not show their result.

@@ -21,6 +21,7 @@ use crate::math::DAffine3;
 use crate::volume::{LengthUnit, Space, Volume, VolumeInit};
 use crate::warning::{Warning, WarningCode};
 use fields::{Container, Fields};
+use std::borrow::Cow;
 
 pub(super) const FORMAT: &str = "NIfTI";
 const DATA: FieldName = FieldName { format: FORMAT, field: "voxel data" };
@@ -140,18 +141,25 @@ impl Header {
         let end = end.ok_or_else(|| FormatError::too_large(FORMAT, "vox_offset", u64::MAX))?;
         if is_gzip(source) {
             let whole = gunzip(FORMAT, source, end.saturating_add(MAX_PADDING))?;
-            return self.volume_of(&whole, size);
+            return self.volume_of(Cow::Owned(whole), size);
         }
-        self.volume_of(source, size)
+        self.volume_of(Cow::Borrowed(source), size)
     }
 
     /// Returns the volume with its voxels decoded from the `size` bytes after the offset.
-    fn volume_of(&self, source: &[u8], size: usize) -> Result<Volume, FormatError> {
-        let Some(rest) = source.get(self.offset..) else {
+    fn volume_of(&self, source: Cow<'_, [u8]>, size: usize) -> Result<Volume, FormatError> {
+        if self.offset > source.len() {
             let needed = self.offset.saturating_add(size);
             return Err(FormatError::truncated(FORMAT, "voxel data", needed, source.len()));
+        }
+        let after_offset = match source {
+            Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[self.offset..]),
+            Cow::Owned(mut bytes) => {
+                bytes.drain(..self.offset);
+                Cow::Owned(bytes)
+            }
         };
-        let numbers = decode(DATA, payload(DATA, rest, size)?, self.scalar, self.big)?;
+        let numbers = decode(DATA, payload(DATA, after_offset, size)?, self.scalar, self.big)?;
         let init = VolumeInit {
             voxels: luminance_of(self.colours, numbers),
             dims: self.dims,

@@ -184,13 +184,13 @@ impl Header {
     fn numbers(&self, source: &Source<'_>) -> Result<Voxels, FormatError> {
         let size = payload_size(DATA, self.dims, self.scalar)?;
         let size = self.colours.map_or(Ok(size), |colours| colours.size(FORMAT, size))?;
-        let decoded = |bytes: &[u8]| decode(DATA, bytes, self.scalar, self.big);
+        let decoded = |bytes: Cow<'_, [u8]>| decode(DATA, bytes, self.scalar, self.big);
         let all = |bytes: &[u8]| match self.encoding {
             Encoding::Text => {
                 let text = self.after_bytes(self.after_lines(bytes)?, size)?;
                 decode_text(DATA, text, self.scalar, size / self.scalar.size())
             }
-            _ => decoded(payload(DATA, &self.binary(bytes, size)?, size)?),
+            _ => decoded(payload(DATA, self.binary(bytes, size)?, size)?),
         };
         source.voxels(FORMAT, size, all, |bytes, size| self.binary(bytes, size), decoded)
     }

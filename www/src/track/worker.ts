@@ -8,7 +8,7 @@ import { Refusal, toFailure } from '../worker/refusal';
 import { logged, type RunLog, RunRecorder } from '../worker/run-log';
 import { type Handlers, sender, serve, Work, withTransfer } from '../worker/serving';
 import { transferOf } from '../worker/surface-buffers';
-import { displayOf, viewOf } from '../worker/volumes';
+import { displayOf, intensitiesOf, viewOf } from '../worker/volumes';
 import { type CineSpec, trueVolume } from './cine';
 import { programOf } from './code';
 import { trackForComparison } from './comparing';
@@ -170,7 +170,7 @@ class Session {
 
   #view(): VolumeView {
     const { name, preparedVolume, display } = this.#image();
-    return { ...viewOf(preparedVolume, name, preparedVolume.frames), ...display };
+    return { ...viewOf(preparedVolume, name, intensitiesOf(preparedVolume, preparedVolume.frames)), ...display };
   }
 
   #image(): LoadedImage {

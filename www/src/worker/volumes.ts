@@ -64,6 +64,8 @@ export interface OpenFrame {
   volume: Volume;
   frames: number;
   unit: LengthUnit | undefined;
+  /** The voxels as they were read, where these are the intensities that the page displays. */
+  voxels: Intensities | undefined;
 }
 
 /**
@@ -78,7 +80,16 @@ export async function openFrame(source: VolumeSource, frame: number): Promise<Op
   const size = x * y * z;
   const data = init.data.subarray(frame * size, (frame + 1) * size);
   const own = concerning(warnings, { frame }).map((warning) => withoutFrame(warning));
-  return { volume: new Volume({ ...init, data, dims: [x, y, z], warnings: own }), frames, unit: init.unit };
+  const volume = new Volume({ ...init, data, dims: [x, y, z], warnings: own });
+  return { volume, frames, unit: init.unit, voxels: displayed({ ...init, data }, volume.range) };
+}
+
+/** Returns voxels that are what {@link intensitiesOf} would make of their volume, which saves a copy; otherwise undefined. */
+function displayed({ data, slope = 1, intercept = 0 }: VolumeInit, range: [number, number]): Intensities | undefined {
+  const narrow = narrowArray(range, 0);
+  const isSame = slope === 1 && intercept === 0 && data.constructor === narrow?.constructor;
+  // Of a longer buffer, a part cannot be given away.
+  return isSame && data.byteLength === data.buffer.byteLength ? (data as Intensities) : undefined;
 }
 
 /** Returns a warning without its place if that is a frame, which is all there is. */
@@ -121,8 +132,11 @@ export function displayOf(source: object): Pick<VolumeView, 'inverted' | 'remark
   return { ...(inverted && { inverted }), ...(remarks.length > 0 && { remarks }) };
 }
 
-/** Returns the data of a volume that the page displays: the intensities of its first `pictures` frames, and metadata. */
-export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
+/**
+ * Returns the data of a volume that the page displays: metadata, and `voxels`, the intensities, by default of its first
+ * frame.
+ */
+export function viewOf(volume: Volume, name: string, voxels = intensitiesOf(volume)): VolumeView {
   const { range } = volume;
   const histogram = volume.histogram(HISTOGRAM_BINS);
   // Quantiles, because a few extreme voxels (metal, noise) must not make all others grey.
@@ -141,7 +155,7 @@ export function viewOf(volume: Volume, name: string, pictures = 1): VolumeView {
     histogram,
     window,
     warnings,
-    voxels: intensitiesOf(volume, pictures),
+    voxels,
   };
 }
 
@@ -162,7 +176,7 @@ export function levelsOf(volume: Volume, levels: number, window: [number, number
 }
 
 /** Returns the intensities of the first `frames` frames in the narrowest type that holds all of them exactly. */
-function intensitiesOf(volume: Volume, frames = 1): Intensities {
+export function intensitiesOf(volume: Volume, frames = 1): Intensities {
   const size = volume.dims.reduce((product, side) => product * side, frames);
   const narrow = narrowArray(volume.range, size);
   return (narrow && filled(narrow, volume, frames)) ?? filled(new Float32Array(size), volume, frames);
