@@ -167,38 +167,9 @@ impl Grid {
         padding: Padding,
         cache: &mut CellCache,
     ) -> f32 {
-        let share = share_of_values(dims, part);
-        if share < 1.0 {
-            return self.sample_at_border((dims, part), share, p, padding, cache);
-        }
-        padding.background + (self.cell_at(p, cache).blend(&cache.corners) - padding.background)
-    }
-
-    /// As [`Self::sample_padded_by`], where the values have a `share` below 1.
-    #[cold]
-    fn sample_at_border(
-        &self,
-        (dims, part): ([usize; 3], Vec3),
-        share: f32,
-        p: Vec3,
-        padding: Padding,
-        cache: &mut CellCache,
-    ) -> f32 {
-        if share <= 0.0 && share_of_padded(dims, part) <= 0.0 {
-            return padding.background;
-        }
-        let cell = self.cell_at(p, cache);
-        padding.beyond(dims, part, share, &cache.corners, |values| cell.blend(values))
-    }
-
-    /// Returns the cell with a position, whose corners are in `cache` afterwards.
-    #[inline]
-    fn cell_at(&self, p: Vec3, cache: &mut CellCache) -> Cell {
-        let cell = Cell::at(self.dims, p);
-        if !cache.is_at(cell.base() as u64) {
-            *cache = CellCache::new(cell.base() as u64, cell.corners(|index| self.values[index]));
-        }
-        cell
+        sample_padded(self.dims, (dims, part), p, padding, cache, |cell| {
+            cell.corners(|index| self.values[index])
+        })
     }
 
     /// Returns the Sobel gradient in intensity per voxel: central differences over two voxels, smoothed by [1 2 1] in
@@ -263,6 +234,52 @@ impl VectorGrid {
         let cell = Cell::at(self.dims, p);
         cell.blend(&cell.corners(|index| self.values[index]))
     }
+}
+
+/// Returns the trilinearly interpolated value at `p` as [`Grid::sample_padded_by`] does, in a grid of `dims` voxels;
+/// `corners` returns the values of a cell.
+#[inline]
+pub(super) fn sample_padded(
+    dims: [usize; 3],
+    parts: ([usize; 3], Vec3),
+    p: Vec3,
+    padding: Padding,
+    cache: &mut CellCache,
+    corners: impl Fn(&Cell) -> [f32; 8],
+) -> f32 {
+    let share = share_of_values(parts.0, parts.1);
+    if share < 1.0 {
+        return sample_at_border(dims, parts, share, p, padding, cache, corners);
+    }
+    padding.background + (cell_at(dims, p, cache, corners).blend(&cache.corners) - padding.background)
+}
+
+/// As [`sample_padded`], where the values have a `share` below 1.
+#[cold]
+fn sample_at_border(
+    dims: [usize; 3],
+    parts: ([usize; 3], Vec3),
+    share: f32,
+    p: Vec3,
+    padding: Padding,
+    cache: &mut CellCache,
+    corners: impl Fn(&Cell) -> [f32; 8],
+) -> f32 {
+    if share <= 0.0 && share_of_padded(parts.0, parts.1) <= 0.0 {
+        return padding.background;
+    }
+    let cell = cell_at(dims, p, cache, corners);
+    padding.beyond(parts.0, parts.1, share, &cache.corners, |values| cell.blend(values))
+}
+
+/// Returns the cell with a position, whose corners are in `cache` afterwards.
+#[inline]
+fn cell_at(dims: [usize; 3], p: Vec3, cache: &mut CellCache, corners: impl Fn(&Cell) -> [f32; 8]) -> Cell {
+    let cell = Cell::at(dims, p);
+    if !cache.is_at(cell.base() as u64) {
+        *cache = CellCache::new(cell.base() as u64, corners(&cell));
+    }
+    cell
 }
 
 /// Weighted sums of 3 × 3 voxel values in the y-z plane at one x, from which Sobel gradients are composed: smoothed

@@ -143,7 +143,7 @@ impl Volume {
     }
 
     /// Returns whether voxels may be NaN or infinite, by the type in which they are stored.
-    fn may_lack_values(&self) -> bool {
+    pub(super) fn may_lack_values(&self) -> bool {
         matches!(self.voxels.as_ref(), Voxels::F32(_) | Voxels::F64(_))
     }
 

@@ -149,9 +149,7 @@ impl Grid {
         unit: f64,
         factor: f64,
     ) -> Result<(Grid, [f64; 3]), VolumeError> {
-        let coarse = self.resample(&reduction(self.dims, axes, spacing, [unit, factor])?)?;
-        let spacing = spacing_of(spacing, self.dims, coarse.dims);
-        Ok((coarse, spacing))
+        reduce_along(self.dims, |z| Ok(self.slice(z)), axes, spacing, [unit, factor])
     }
 
     /// Updates `coarse`, which [`Self::reduce`] returned for this grid and the same `spacing`, `unit` and `factor`,
@@ -194,18 +192,42 @@ impl Grid {
             dims: ranges.map(|range| range.len()),
         };
         let (to, from) = (region(to), region(from));
-        let part = self.part(from)?.resample(&[x.weights, y.weights, z.weights])?;
+        let (part, taps) = (self.part(from)?, [x.weights, y.weights, z.weights]);
+        let part = resampled(from.dims, &taps, |z| Ok(part.slice(z)))?;
         coarse.overwrite(to, &part);
         Ok(Some(to))
     }
 
-    fn resample(&self, taps: &[ResamplingWeights; 3]) -> Result<Grid, VolumeError> {
-        let dims = [0, 1, 2].map(|axis| taps[axis].spans.len());
+    fn slice(&self, z: usize) -> &[f32] {
         let size = self.dims[0] * self.dims[1];
-        let mut values = filled(dims.iter().product(), 0.0)?;
-        resample(self.dims, taps, |slice| Ok(&self.values[slice * size..][..size]), &mut values)?;
-        Ok(Grid { dims, values })
+        &self.values[z * size..(z + 1) * size]
     }
+}
+
+/// Returns what [`Grid::reduce_along`] does, of a grid of `dims` whose slices across z `slice` returns; the last argument is
+/// `unit` and `factor`.
+pub(super) fn reduce_along<S: AsRef<[f32]>>(
+    dims: [usize; 3],
+    slice: impl Fn(usize) -> Result<S, VolumeError>,
+    axes: [bool; 3],
+    spacing: [f64; 3],
+    steps: [f64; 2],
+) -> Result<(Grid, [f64; 3]), VolumeError> {
+    let coarse = resampled(dims, &reduction(dims, axes, spacing, steps)?, slice)?;
+    let spacing = spacing_of(spacing, dims, coarse.dims);
+    Ok((coarse, spacing))
+}
+
+/// Returns the grid that [`resample`] makes of the slices of one of `dims`.
+fn resampled<S: AsRef<[f32]>>(
+    dims: [usize; 3],
+    taps: &[ResamplingWeights; 3],
+    slice: impl Fn(usize) -> Result<S, VolumeError>,
+) -> Result<Grid, VolumeError> {
+    let coarse = [0, 1, 2].map(|axis| taps[axis].spans.len());
+    let mut values = filled(coarse.iter().product(), 0.0)?;
+    resample(dims, taps, slice, &mut values)?;
+    Ok(Grid { dims: coarse, values })
 }
 
 /// Resamples a grid of `dims`, whose slices across z `slice` returns, with the weights `taps`, and adds the result to `out`.

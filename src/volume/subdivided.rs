@@ -1,8 +1,8 @@
 //! Grids with elongated voxels, divided along their long sides by linear interpolation, without storing the result.
 
 use super::error::{VolumeError, reserve};
-use super::sampling::{Cell, locate};
-use super::{Grid, Region};
+use super::sampling::locate;
+use super::{FrameGrid, Grid, Region};
 use crate::math::Vec3;
 use std::borrow::Cow;
 
@@ -11,35 +11,34 @@ use std::borrow::Cow;
 /// interpolation of the parts is that of the voxels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Subdivided<'a> {
-    grid: &'a Grid,
+    grid: &'a FrameGrid,
     parts: [usize; 3],
 }
 
 impl<'a> Subdivided<'a> {
     /// Creates the division of the voxels of a grid into `parts` along each axis, odd numbers.
-    pub(crate) fn new(grid: &'a Grid, parts: [usize; 3]) -> Self {
+    pub(crate) fn new(grid: &'a FrameGrid, parts: [usize; 3]) -> Self {
         Self { grid, parts }
     }
 
     /// Creates the grid itself, without dividing its voxels.
-    pub(crate) fn whole(grid: &'a Grid) -> Self {
+    pub(crate) fn whole(grid: &'a FrameGrid) -> Self {
         Self::new(grid, [1; 3])
     }
 
     /// Returns the number of parts of all voxels along each axis.
     pub(crate) fn dims(&self) -> [usize; 3] {
-        [0, 1, 2].map(|axis| self.grid.dims[axis] * self.parts[axis])
+        [0, 1, 2].map(|axis| self.grid.dims()[axis] * self.parts[axis])
     }
 
     /// Returns the value of a part, given by its index in a grid of [`Self::dims`].
     pub(crate) fn value(&self, part: usize) -> f32 {
         if self.parts == [1; 3] {
-            return self.grid.values[part];
+            return self.grid.value(part);
         }
         let [nx, ny, _] = self.dims();
         let p = Vec3::from(self.coordinates([part % nx, part / nx % ny, part / nx / ny]));
-        let cell = Cell::at(self.grid.dims, p);
-        cell.blend(&cell.corners(|index| self.grid.values[index]))
+        self.grid.sample(p)
     }
 
     /// Returns the parts in a region, given in their indices.
@@ -57,20 +56,18 @@ impl<'a> Subdivided<'a> {
 
     /// Returns the values of all parts with the index `z`, row by row.
     pub(crate) fn slice(&self, z: usize) -> Cow<'a, [f32]> {
-        let [nx, ny, nz] = self.grid.dims;
-        let plane = |z: usize| &self.grid.values[z * nx * ny..(z + 1) * nx * ny];
-        let (low, share) = locate(self.coordinate(2, z), nz);
+        let (low, share) = locate(self.coordinate(2, z), self.grid.dims()[2]);
         let between: Cow<[f32]> = if share > 0.0 {
-            Cow::Owned(mixed(plane(low), plane(low + 1), share))
+            Cow::Owned(mixed(&self.grid.slice(low), &self.grid.slice(low + 1), share))
         } else {
-            Cow::Borrowed(plane(low))
+            self.grid.slice(low)
         };
         if self.parts[0] == 1 && self.parts[1] == 1 { between } else { Cow::Owned(self.divided(&between)) }
     }
 
     /// Divides the voxels of one slice along x and y.
     fn divided(&self, slice: &[f32]) -> Vec<f32> {
-        let ([nx, ny, _], [fine_x, fine_y, _]) = (self.grid.dims, self.dims());
+        let ([nx, ny, _], [fine_x, fine_y, _]) = (self.grid.dims(), self.dims());
         let columns: Vec<(usize, f32)> = (0..fine_x).map(|x| locate(self.coordinate(0, x), nx)).collect();
         let mut values = Vec::with_capacity(fine_x * fine_y);
         for y in 0..fine_y {
@@ -112,7 +109,8 @@ mod tests {
         for parts in [[1, 1, 5], [3, 1, 1], [1, 7, 3], [1, 1, 1], [3, 3, 3]] {
             let dims = [5, 4, 3];
             let grid = Grid { dims, values: (0..60).map(|_| random.unit() as f32).collect() };
-            let divided = Subdivided::new(&grid, parts);
+            let shared = FrameGrid::from(grid.clone());
+            let divided = Subdivided::new(&shared, parts);
             let [nx, ny, nz] = divided.dims();
             let region = Region { min: [1, 2, 0], dims: [nx - 1, ny - 3, nz] };
             let part = divided.region(region).unwrap();

@@ -122,7 +122,7 @@ impl DeformableModel {
         let end = [0, 1, 2].map(|axis| (high[axis].max(0.0) as usize + 1).clamp(min[axis] + 1, dims[axis]));
         let region = Region { min, dims: [0, 1, 2].map(|axis| end[axis] - min[axis]) };
         let offset = Vec3::from(min.map(|k| k as f32));
-        let part = grid.region(region)?;
+        let part = grid.region(region)?.into();
         let object = ObjectIs::by(&self.params);
         let surface = contour_of_grid(&Subdivided::whole(&part), self.level_iso, object)?;
         Ok(placed(surface, |p| position(p + offset)))

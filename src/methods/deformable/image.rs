@@ -4,6 +4,8 @@
 //! way); an affine map leads to world space. Voxels that are too long for that are divided into equal parts along their
 //! long sides, and the parts count as cubes. Their intensities are those of trilinear interpolation, and are not stored.
 
+use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::DeformableParams;
@@ -13,7 +15,8 @@ use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::methods::MethodError;
 use crate::pauses::{Pauses, finished};
 use crate::volume::{
-    BrickGrid, CellCache, Grid, NotFinite, Padding, Region, SparseVolume, Subdivided, VectorGrid, Volume,
+    BrickGrid, CellCache, FrameGrid, Grid, NotFinite, Padding, Region, SparseVolume, Subdivided, VectorGrid,
+    Volume,
 };
 use crate::warning::{Warning, WarningCode};
 
@@ -68,7 +71,7 @@ const MAX_BEYOND: f32 = 0.5;
 #[derive(Debug)]
 pub(super) struct LevelImage {
     /// The intensities of the level; without values if the level is sparse.
-    grid: Grid,
+    grid: FrameGrid,
     /// The loaded bricks of a sparse level, while the model computes; between its steps the volume has them.
     bricks: Option<BrickGrid>,
     gradient: Option<VectorGrid>,
@@ -108,11 +111,12 @@ impl Clone for LevelImage {
 impl LevelImage {
     /// Makes a level whose voxels are divided into `parts`; `finest` is the number of parts of the finest level along each
     /// axis.
-    fn new(grid: Grid, parts: [usize; 3], finest: [usize; 3]) -> Self {
+    fn new(grid: impl Into<FrameGrid>, parts: [usize; 3], finest: [usize; 3]) -> Self {
+        let grid = grid.into();
         let scale_of =
             |dims: [usize; 3]| Vec3::from([0, 1, 2].map(|axis| dims[axis] as f32 / finest[axis] as f32));
         let [scale, part_scale] =
-            [grid.dims, [0, 1, 2].map(|axis| grid.dims[axis] * parts[axis])].map(scale_of);
+            [grid.dims(), [0, 1, 2].map(|axis| grid.dims()[axis] * parts[axis])].map(scale_of);
         let [offset, part_offset] = [scale, part_scale].map(|scale| (scale - Vec3::ONE) * 0.5);
         Self { grid, bricks: None, gradient: None, scale, offset, parts, part_scale, part_offset }
     }
@@ -124,7 +128,7 @@ impl LevelImage {
             parts => [scale[axis] * parts, (offset[axis] + 0.5) * parts - 0.5],
         };
         Self {
-            grid: Grid { dims, values: Vec::new() },
+            grid: Grid { dims, values: Vec::new() }.into(),
             bricks: Some(BrickGrid::default()),
             gradient: None,
             scale,
@@ -242,8 +246,15 @@ impl LevelImage {
     /// Returns the mean of all intensities above `iso` if `above` is set, otherwise of all below it; `None` if there
     /// are none. It is used as the mean intensity of the background.
     pub(super) fn mean_beyond(&self, iso: f32, above: bool) -> Option<f32> {
-        let beyond = self.grid.values.iter().filter(|&&value| if above { value > iso } else { value < iso });
-        let (sum, count) = beyond.fold((0.0, 0), |(sum, count), &value| (sum + f64::from(value), count + 1));
+        let (mut sum, mut count) = (0.0, 0);
+        for z in 0..self.dims()[2] {
+            for &value in self.grid.slice(z).iter() {
+                if if above { value > iso } else { value < iso } {
+                    sum += f64::from(value);
+                    count += 1;
+                }
+            }
+        }
         (count > 0).then(|| (sum / f64::from(count)) as f32)
     }
 
@@ -288,28 +299,31 @@ impl LevelImage {
     /// Calls `visit` with the signed difference of intensity, per part of a voxel, of each pair of voxels that share a face
     /// and are on opposite sides of `iso`, from which the steepness of the image is computed.
     fn for_each_iso_crossing(&self, iso: f32, mut visit: impl FnMut(f32)) {
-        let [nx, ny, nz] = self.grid.dims;
+        let [nx, ny, nz] = self.grid.dims();
         let parts = self.parts.map(|n| n as f32);
         let mut pass = |a: &[f32], b: &[f32], axis: usize| {
             let iso_crossings = a.iter().zip(b).filter(|&(&a, &b)| (a < iso) != (b < iso));
             iso_crossings.for_each(|(&a, &b)| visit((a - b) / parts[axis]));
         };
-        let rows: Vec<&[f32]> = self.grid.values.chunks_exact(nx).collect();
-        for (k, row) in rows.iter().enumerate() {
-            pass(&row[1..], row, 0);
-            if k % ny + 1 < ny {
-                pass(rows[k + 1], row, 1);
+        let mut slice = self.grid.slice(0);
+        for z in 0..nz {
+            let next = if z + 1 < nz { self.grid.slice(z + 1) } else { Cow::default() };
+            let rows: Vec<&[f32]> = slice.chunks_exact(nx).collect();
+            for (y, row) in rows.iter().enumerate() {
+                pass(&row[1..], row, 0);
+                if y + 1 < ny {
+                    pass(rows[y + 1], row, 1);
+                }
+                pass(next.get(y * nx..(y + 1) * nx).unwrap_or_default(), row, 2);
             }
-            if k / ny + 1 < nz {
-                pass(rows[k + ny], row, 2);
-            }
+            slice = next;
         }
     }
 
     /// Updates the gradient image, if there is one, after the intensities in a region have changed.
     fn update_gradient(&mut self, changed: Region) -> Result<(), MethodError> {
         if let Some(gradient) = &mut self.gradient {
-            self.grid.update_sobel(gradient, changed)?;
+            self.grid.stored_mut()?.update_sobel(gradient, changed)?;
         }
         Ok(())
     }
@@ -327,7 +341,7 @@ impl LevelImage {
 
     /// Returns the number of voxels along each axis.
     pub(super) fn dims(&self) -> [usize; 3] {
-        self.grid.dims
+        self.grid.dims()
     }
 }
 
@@ -410,12 +424,12 @@ impl Pyramid {
             return Err(MethodError::invalid("levels", problem));
         }
         let pass = volume.dims().iter().product::<usize>() / VOXELS_PER_UNIT + 1;
-        let grid = volume.normalised_grid(frame)?;
+        let grid = volume.frame_grid(volume.range(), frame)?;
         pauses.after(pass).await;
         let hash = hash_of(&grid, Region { min: [0; 3], dims: volume.dims() });
         let volume_range = [volume.range()[0], volume.span()];
-        let divided = [0, 1, 2].map(|axis| grid.dims[axis] * parts[axis]);
-        let is_flat = grid.values.iter().all(|value| *value == grid.values[0]);
+        let divided = [0, 1, 2].map(|axis| grid.dims()[axis] * parts[axis]);
+        let is_flat = (0..grid.dims()[2]).all(|z| grid.slice(z).iter().all(|&value| value == grid.value(0)));
         pauses.after(pass).await;
         let mut pyramid = Self {
             levels: vec![LevelImage::new(grid, parts, divided)],
@@ -434,13 +448,13 @@ impl Pyramid {
         pauses.after(pass).await;
         if let Some([low, high]) = volume.window_at(params.iso, frame)? {
             [pyramid.low, pyramid.range] = [low, high - low];
-            pyramid.levels = vec![LevelImage::new(volume.grid_in([low, high], frame)?, parts, divided)];
+            pyramid.levels = vec![LevelImage::new(volume.frame_grid([low, high], frame)?, parts, divided)];
         }
         if pyramid.is_windowed() || volume.is_wide(frame)? {
             pyramid.source = Some((volume.clone(), frame));
         }
         pauses.after(pass).await;
-        pyramid.set_not_finite(params);
+        pyramid.set_not_finite(params)?;
         pyramid.build_levels(above)?;
         pauses.after(pass).await;
         Ok(pyramid)
@@ -472,7 +486,7 @@ impl Pyramid {
             sparse: None,
             ..*self
         };
-        adapted.set_not_finite(params);
+        adapted.set_not_finite(params)?;
         adapted.build_levels(above)?;
         Ok(Some(adapted))
     }
@@ -497,12 +511,13 @@ impl Pyramid {
 
     /// Gives values to the voxels of the finest level that are not finite: NaN is never object, infinite voxels are on
     /// their side of the iso value.
-    fn set_not_finite(&mut self, params: &DeformableParams) {
-        let Some(not_finite) = &self.not_finite else { return };
+    fn set_not_finite(&mut self, params: &DeformableParams) -> Result<(), MethodError> {
+        let Some(not_finite) = &self.not_finite else { return Ok(()) };
         let (iso, object) = (self.iso(params), ObjectIs::by(params));
-        let grid = &mut self.levels[0].grid;
+        let grid = self.levels[0].grid.stored_mut()?;
         let far = [ObjectIs::Brighter, ObjectIs::Darker].map(|object| object.background(iso));
         not_finite.replace(grid, iso, object.is_above(), far);
+        Ok(())
     }
 
     /// Makes `above` levels from the finest, the only one.
@@ -537,7 +552,8 @@ impl Pyramid {
         let Some(coarsest) = volume.whole(last)? else {
             return Err(MethodError::NeedsData { needs: volume.missing(last)? });
         };
-        let hash = hash_of(&coarsest, Region { min: [0; 3], dims: coarsest.dims });
+        let coarsest = FrameGrid::from(coarsest);
+        let hash = hash_of(&coarsest, Region { min: [0; 3], dims: coarsest.dims() });
         let spacing = spacing_of(&first.affine);
         let parts = parts_of(spacing);
         let to_world = model_to_world(&first.affine, parts);
@@ -620,7 +636,7 @@ impl Pyramid {
     /// [`MethodError::Volume`] if memory does not suffice; part of the levels is out of date then.
     pub(super) fn update(&mut self, region: Region, new: &Grid) -> Result<(), MethodError> {
         let before = hash_of(&self.levels[0].grid, region);
-        self.levels[0].grid.overwrite(region, new);
+        self.levels[0].grid.stored_mut()?.overwrite(region, new);
         self.hash = self.hash.wrapping_sub(before).wrapping_add(hash_of(&self.levels[0].grid, region));
         self.levels[0].update_gradient(region)?;
         let (mut changed, mut spacing) = (region, self.spacing);
@@ -628,13 +644,12 @@ impl Pyramid {
         for level in 1..self.levels.len() {
             let (finer, coarser) = self.levels.split_at_mut(level);
             let axes = finer[level - 1].parts.map(|n| n == 1);
-            let (from, to) = (&finer[level - 1].grid, &mut coarser[0]);
+            let (from, to) = (finer[level - 1].grid.stored_mut()?, &mut coarser[0]);
             let steps = [unit, REDUCTION];
-            let updated = from.update_reduced_along(axes, &mut to.grid, changed, spacing, steps)?;
+            let updated = from.update_reduced_along(axes, to.grid.stored_mut()?, changed, spacing, steps)?;
             let Some(updated) = updated else { return Ok(()) };
             to.update_gradient(updated)?;
-            spacing =
-                [0, 1, 2].map(|axis| spacing[axis] * from.dims[axis] as f64 / to.grid.dims[axis] as f64);
+            spacing = [0, 1, 2].map(|axis| spacing[axis] * from.dims[axis] as f64 / to.dims()[axis] as f64);
             (changed, unit) = (updated, unit * REDUCTION);
         }
         Ok(())
@@ -783,10 +798,12 @@ fn spacing_of(affine: &DAffine3) -> [f64; 3] {
 }
 
 /// Returns the sum of the hashes of the voxels of a grid in a region.
-fn hash_of(grid: &Grid, region: Region) -> u64 {
-    let rows = region.rows(grid.dims, 0);
-    let voxels = rows.flat_map(|row| row.clone().zip(&grid.values[row]));
-    voxels.fold(0, |sum, (k, value)| sum.wrapping_add(hash_of_voxel(k, *value)))
+fn hash_of(grid: &FrameGrid, region: Region) -> u64 {
+    let of_row = |row: Range<usize>| {
+        let values = grid.values(row.clone());
+        row.zip(values.iter()).fold(0, |sum: u64, (k, &value)| sum.wrapping_add(hash_of_voxel(k, value)))
+    };
+    region.rows(grid.dims(), 0).map(of_row).fold(0, u64::wrapping_add)
 }
 
 /// Returns the hash of one voxel, given its index in the grid and its intensity. The hashes of an image are added up, so

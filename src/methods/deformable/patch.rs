@@ -336,7 +336,7 @@ struct Piece {
 
 impl Piece {
     fn new(image: &LevelImage, at: PatchBox, rule: ContourRule) -> Result<Self, MethodError> {
-        let part = image.part_grid().0.region(at.voxels)?;
+        let part = image.part_grid().0.region(at.voxels)?.into();
         let offset = Vec3::from(at.voxels.min.map(|k| k as f32));
         let mut surface =
             placed(contour_of_grid(&Subdivided::whole(&part), rule.iso, rule.object)?, |p| p + offset);
