@@ -186,11 +186,6 @@ export interface DeformableRunOptions extends RunOptions {
   onData?: DataOptions['onData'];
 }
 
-/**
- * Number of triangles tested between two checks of the clock during a coverage measurement: some milliseconds of work.
- */
-const TRIANGLES_AT_ONCE = 512;
-
 const OPTIONS = ['volume', 'frame', 'start', 'levels', 'finest', 'box', 'edge', 'params'];
 const RUN_OPTIONS = ['signal', 'maxIterations', 'budgetMs', 'onStep', 'onData'];
 
@@ -435,9 +430,11 @@ export class DeformableModel implements Stepper {
     const survey = this.#use((raw) => new Handle('survey', () => raw.surveyCoverage()));
     const advance = () => {
       // The survey has its own copy of the surface, but freeing the model must still end it.
-      const share = this.#handle.use(() => survey.use((raw) => raw.advance(TRIANGLES_AT_ONCE)));
+      const [coverage, share] = this.#handle.use(() =>
+        survey.use((raw) => [raw.advance() as Coverage | undefined, raw.share()] as const),
+      );
       onProgress?.(share);
-      return share < 1 ? undefined : survey.use((raw) => raw.finish() as Coverage);
+      return coverage;
     };
     try {
       return await runInSlices(advance, signal);

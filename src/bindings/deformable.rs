@@ -185,7 +185,7 @@ impl RawDeformable {
     #[wasm_bindgen(js_name = surveyCoverage)]
     pub fn survey_coverage(&self) -> Result<RawCoverageSurvey, JsValue> {
         let survey = self.ready().survey_coverage().map_err(Failure::from)?;
-        Ok(RawCoverageSurvey(Some(survey)))
+        Ok(RawCoverageSurvey(survey))
     }
 
     /// Replaces the attractors, points that pull the surface: five numbers each, which are x, y and z in world space,
@@ -224,20 +224,24 @@ impl RawDeformable {
 /// A measurement in progress of how far the surface of a model, as it was at the start of the measurement, and the
 /// iso-surface of the volume cover each other.
 #[wasm_bindgen]
-pub struct RawCoverageSurvey(Option<CoverageSurvey>);
+pub struct RawCoverageSurvey(CoverageSurvey);
 
 #[wasm_bindgen]
 impl RawCoverageSurvey {
-    /// Tests the next `triangles` triangles of the two surfaces; returns the fraction of all triangles tested so far.
-    pub fn advance(&mut self, triangles: usize) -> f64 {
-        self.0.as_mut().map_or(1.0, |survey| survey.advance(triangles))
+    /// Does a slice of the work; returns the coverage at the end, recall, precision and uncovered regions, after which this
+    /// must not be called any more.
+    pub fn advance(&mut self) -> Result<Option<JsValue>, JsValue> {
+        match self.0.advance() {
+            Poll::Pending => Ok(None),
+            Poll::Ready(coverage) => {
+                Ok(Some(to_js(&CoverageResult::from(coverage.map_err(Failure::from)?))?))
+            }
+        }
     }
 
-    /// Returns the coverage: recall, precision and uncovered regions; to be called once, after `advance` has tested all
-    /// triangles. An error if it is called again.
-    pub fn finish(&mut self) -> Result<JsValue, JsValue> {
-        let survey = self.0.take().ok_or_else(|| Failure::invalid("coverage", "already finished"))?;
-        Ok(to_js(&CoverageResult::from(survey.finish()))?)
+    /// Returns the fraction of all triangles tested so far.
+    pub fn share(&self) -> f64 {
+        self.0.share()
     }
 }
 

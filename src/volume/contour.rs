@@ -6,9 +6,10 @@
 
 use super::cube_cases::{Case, EDGES, FAR_EDGES, cases};
 use super::error::VolumeError;
-use super::{Grid, Volume};
+use super::{Grid, Region, Volume};
 use crate::math::{DAffine3, Vec3};
 use crate::mesh::{TriangleMesh, grid_origin};
+use crate::pauses::{Pauses, finished};
 use std::borrow::Cow;
 use std::collections::TryReserveError;
 
@@ -47,43 +48,110 @@ pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<T
 /// `iso` not finite, a grid whose values do not match its dimensions, [`VolumeError::TooLarge`].
 pub fn marching_cubes(grid: &Grid, iso: f32) -> Result<TriangleMesh, VolumeError> {
     grid.check()?;
-    let plane = grid.dims[0] * grid.dims[1];
-    marching_cubes_of_slices(grid.dims, iso, &|z| grid.values[z * plane..(z + 1) * plane].into())
+    finished(marching_cubes_in_slices(grid, iso, MOST_TRIANGLES, &Pauses::default()))
 }
 
-/// Extracts the iso-surface as [`marching_cubes`], of a grid given slice by slice: `slice` returns the values of the
-/// voxels with an index z, and is called once for each, in ascending order.
-///
-/// # Errors
-/// `iso` not finite; [`VolumeError::TooLarge`].
-pub(crate) fn marching_cubes_of_slices<'a>(
-    dims: [usize; 3],
-    iso: f32,
-    slice: &dyn Fn(usize) -> Cow<'a, [f32]>,
-) -> Result<TriangleMesh, VolumeError> {
-    bounded_marching_cubes(dims, iso, usize::MAX, slice)
+/// The largest number of triangles of an iso-surface: meshes of four million vertices are as large as there is memory to work
+/// with.
+const MOST_TRIANGLES: usize = 8_000_000;
+
+/// The number of voxels of a slice above which slices across another axis are taken if they are smaller: the state of
+/// marching cubes takes 30 bytes for each voxel of a slice.
+const LARGE_SLICE: usize = 1 << 23;
+
+/// The numbers of voxels and of triangles that are a unit of work between pauses.
+const VOXELS_PER_UNIT: usize = 512;
+const TRIANGLES_PER_UNIT: usize = 64;
+
+/// A field that is read slice by slice.
+pub(crate) trait Slices {
+    /// Returns the number of voxels along x, y and z.
+    fn dims(&self) -> [usize; 3];
+
+    /// Returns the values of the slice with an index z, row by row.
+    fn slice(&self, z: usize) -> Result<Cow<'_, [f32]>, VolumeError>;
+
+    /// Returns the values in a region within the field.
+    fn region(&self, region: Region) -> Result<Grid, VolumeError>;
 }
 
-/// Extracts the iso-surface as [`marching_cubes_of_slices`], with about `most` triangles at most.
+impl Slices for Grid {
+    fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    fn slice(&self, z: usize) -> Result<Cow<'_, [f32]>, VolumeError> {
+        let plane = self.dims[0] * self.dims[1];
+        Ok(self.values[z * plane..(z + 1) * plane].into())
+    }
+
+    fn region(&self, region: Region) -> Result<Grid, VolumeError> {
+        self.part(region)
+    }
+}
+
+/// A field whose axes are z, x and y of another.
+struct Turned<'a>(&'a dyn Slices);
+
+impl Slices for Turned<'_> {
+    fn dims(&self) -> [usize; 3] {
+        let [nx, ny, nz] = self.0.dims();
+        [nz, nx, ny]
+    }
+
+    fn slice(&self, y: usize) -> Result<Cow<'_, [f32]>, VolumeError> {
+        let [nx, _, nz] = self.0.dims();
+        let section = self.0.region(Region { min: [0, y, 0], dims: [nx, 1, nz] })?;
+        let along_z = |x: usize| section.values[x..].iter().step_by(nx).copied();
+        Ok((0..nx).flat_map(along_z).collect())
+    }
+
+    fn region(&self, Region { min: [z, x, y], dims: [nz, nx, ny] }: Region) -> Result<Grid, VolumeError> {
+        self.0.region(Region { min: [x, y, z], dims: [nx, ny, nz] })
+    }
+}
+
+/// Extracts the iso-surface as [`marching_cubes`], with about `most` triangles at most; pauses after slices, each of which
+/// is read once.
 ///
 /// # Errors
-/// As there; [`VolumeError::TooManyTriangles`].
-pub(crate) fn bounded_marching_cubes<'a>(
-    dims: [usize; 3],
+/// `iso` not finite; [`VolumeError::TooManyTriangles`], [`VolumeError::TooLarge`].
+pub(crate) async fn marching_cubes_in_slices(
+    field: &dyn Slices,
     iso: f32,
     most: usize,
-    slice: &dyn Fn(usize) -> Cow<'a, [f32]>,
+    pauses: &Pauses,
 ) -> Result<TriangleMesh, VolumeError> {
     if !iso.is_finite() {
         return Err(VolumeError::invalid("iso", format!("must be finite, got {iso}")));
     }
+    let [nx, ny, nz] = field.dims();
+    if nx * ny <= LARGE_SLICE || ny <= nz {
+        return slice_by_slice(field, iso, most, pauses).await;
+    }
+    let mut mesh = slice_by_slice(&Turned(field), iso, most, pauses).await?;
+    mesh.positions.iter_mut().for_each(|p| *p = Vec3::new(p.y, p.z, p.x));
+    Ok(mesh)
+}
+
+async fn slice_by_slice(
+    field: &dyn Slices,
+    iso: f32,
+    most: usize,
+    pauses: &Pauses,
+) -> Result<TriangleMesh, VolumeError> {
+    let dims = field.dims();
     let mut marching = MarchingCubes::new(dims, iso)?;
     for z in 0..=dims[2] {
-        let next = if z < dims[2] { slice(z) } else { Cow::default() };
+        let next = if z < dims[2] { field.slice(z)? } else { Cow::default() };
+        let before = marching.mesh.triangles.len();
         marching.layer(z, next)?;
-        if marching.mesh.triangles.len() > most {
+        let count = marching.mesh.triangles.len();
+        if count > most {
             return Err(VolumeError::TooManyTriangles { most });
         }
+        let work = dims[0] * dims[1] / VOXELS_PER_UNIT + (count - before) / TRIANGLES_PER_UNIT;
+        pauses.after(1 + work).await;
     }
     Ok(marching.mesh)
 }
@@ -319,10 +387,10 @@ mod tests {
     #[test]
     fn too_many_triangles_are_refused_by_their_number() {
         let ball = ball(20, 8.0);
-        let slice = |z: usize| ball.values[z * 400..(z + 1) * 400].into();
-        let count = bounded_marching_cubes(ball.dims, 0.0, usize::MAX, &slice).unwrap().triangles.len();
-        assert!(bounded_marching_cubes(ball.dims, 0.0, count, &slice).is_ok());
-        let error = bounded_marching_cubes(ball.dims, 0.0, count - 1, &slice).unwrap_err();
+        let bounded = |most| finished(marching_cubes_in_slices(&ball, 0.0, most, &Pauses::default()));
+        let count = bounded(usize::MAX).unwrap().triangles.len();
+        assert!(bounded(count).is_ok());
+        let error = bounded(count - 1).unwrap_err();
         assert_eq!(error, VolumeError::TooManyTriangles { most: count - 1 });
         assert!(error.to_string().starts_with("the contour has more than"), "{error}");
     }

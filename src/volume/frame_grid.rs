@@ -17,8 +17,8 @@ use std::sync::Arc;
 /// take up to four times as much memory as the volume beside it.
 #[derive(Clone, Debug)]
 pub(crate) enum FrameGrid {
-    /// Intensities in single precision.
-    Stored(Grid),
+    /// Intensities in single precision, shared by clones until they are changed.
+    Stored(Arc<Grid>),
     /// The voxels of a volume, all of them finite.
     Shared(SharedVoxels),
 }
@@ -69,7 +69,7 @@ impl SharedVoxels {
 
 impl From<Grid> for FrameGrid {
     fn from(grid: Grid) -> Self {
-        Self::Stored(grid)
+        Self::Stored(Arc::new(grid))
     }
 }
 
@@ -104,6 +104,24 @@ impl FrameGrid {
         }
     }
 
+    /// As [`Self::values`], in a buffer where they are not stored.
+    pub(crate) fn values_in<'a>(&'a self, voxels: Range<usize>, buffer: &'a mut Vec<f32>) -> &'a [f32] {
+        match self {
+            Self::Stored(grid) => &grid.values[voxels],
+            Self::Shared(shared) => {
+                buffer.clear();
+                shared.append(voxels, buffer);
+                buffer
+            }
+        }
+    }
+
+    /// Returns all intensities in parts of at most `size` voxels.
+    pub(crate) fn parts(&self, size: usize) -> impl Iterator<Item = Cow<'_, [f32]>> {
+        let count = self.dims().iter().product::<usize>();
+        (0..count).step_by(size).map(move |first| self.values(first..count.min(first + size)))
+    }
+
     /// Returns the intensities of the slice with the index `z`, row by row.
     pub(crate) fn slice(&self, z: usize) -> Cow<'_, [f32]> {
         let [nx, ny, _] = self.dims();
@@ -127,10 +145,10 @@ impl FrameGrid {
     /// [`VolumeError::TooLarge`].
     pub(crate) fn stored_mut(&mut self) -> Result<&mut Grid, VolumeError> {
         if let Self::Shared(shared) = self {
-            *self = Self::Stored(shared.stored()?);
+            *self = shared.stored()?.into();
         }
         match self {
-            Self::Stored(grid) => Ok(grid),
+            Self::Stored(grid) => Ok(Arc::make_mut(grid)),
             Self::Shared(_) => unreachable!("has just been replaced"),
         }
     }
@@ -201,7 +219,7 @@ impl Volume {
     /// As [`Self::grid_in`].
     pub(crate) fn frame_grid(&self, range: [f64; 2], frame: usize) -> Result<FrameGrid, VolumeError> {
         if self.may_lack_values() {
-            return self.grid_in(range, frame).map(FrameGrid::Stored);
+            return self.grid_in(range, frame).map(FrameGrid::from);
         }
         Ok(FrameGrid::Shared(SharedVoxels {
             dims: self.dims(),
@@ -248,6 +266,8 @@ mod tests {
                 let mut grid = volume.frame_grid(range, frame).unwrap();
                 assert_eq!(grid.dims(), stored.dims);
                 assert_eq!(grid.values(3..29)[..], stored.values[3..29]);
+                assert_eq!(grid.values_in(3..29, &mut Vec::new()), &stored.values[3..29]);
+                assert_eq!(grid.parts(9).collect::<Vec<_>>().concat(), stored.values);
                 assert!(stored.values.iter().enumerate().all(|(k, &value)| grid.value(k) == value));
                 let region = Region { min: [2, 0, 1], dims: [4, 5, 2] };
                 assert_eq!(grid.part(region).unwrap(), stored.part(region).unwrap());

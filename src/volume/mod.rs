@@ -56,7 +56,7 @@ mod write;
 
 pub use bricks::BRICK;
 pub(crate) use bricks::{BrickGrid, BrickId};
-pub(crate) use contour::{bounded_marching_cubes, marching_cubes_of_slices};
+pub(crate) use contour::{Slices, marching_cubes_in_slices};
 pub use contour::{marching_cubes, marching_cubes_world};
 pub use coverage::coverage;
 pub use enrich::Enrichment;

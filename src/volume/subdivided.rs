@@ -2,7 +2,7 @@
 
 use super::error::{VolumeError, reserve};
 use super::sampling::locate;
-use super::{FrameGrid, Grid, Region};
+use super::{FrameGrid, Grid, Region, Slices};
 use crate::math::Vec3;
 use std::borrow::Cow;
 
@@ -89,6 +89,20 @@ impl<'a> Subdivided<'a> {
 
     fn coordinate(&self, axis: usize, part: usize) -> f32 {
         (part as f32 + 0.5) / self.parts[axis] as f32 - 0.5
+    }
+}
+
+impl Slices for Subdivided<'_> {
+    fn dims(&self) -> [usize; 3] {
+        self.dims()
+    }
+
+    fn slice(&self, z: usize) -> Result<Cow<'_, [f32]>, VolumeError> {
+        Ok(self.slice(z))
+    }
+
+    fn region(&self, region: Region) -> Result<Grid, VolumeError> {
+        self.region(region)
     }
 }
 

@@ -2,6 +2,7 @@
 //! characteristics, and a mean error of at most 0.15 voxels.
 
 use super::common::{Random, euler_of_parts, scenes};
+use std::task::Poll;
 use vesicle::math::{DAffine3, DMat3, DVec3, Vec3};
 use vesicle::mesh::{TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::deformable::{
@@ -185,11 +186,14 @@ fn coverage_in_slices_is_the_same() {
     let model = DeformableModel::new(&volume, DeformableOptions::default()).unwrap();
     let mut survey = model.survey_coverage().unwrap();
     let mut shares = vec![0.0];
-    while shares[shares.len() - 1] < 1.0 {
-        shares.push(survey.advance(100));
-    }
-    assert!(shares.len() > 5 && shares.is_sorted());
-    assert_eq!(survey.finish(), model.coverage().unwrap());
+    let coverage = loop {
+        match survey.advance() {
+            Poll::Ready(coverage) => break coverage.unwrap(),
+            Poll::Pending => shares.push(survey.share()),
+        }
+    };
+    assert!(shares.len() > 5 && shares.is_sorted() && survey.share() == 1.0);
+    assert_eq!(coverage, model.coverage().unwrap());
 }
 
 /// Components that enclose fewer voxels than `smallest_part` are left out, larger ones are not.

@@ -7,8 +7,11 @@ use crate::math::order::sort_by_rank;
 use crate::math::{Bounds, Vec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
+use crate::pauses::{Pauses, finished};
 use crate::remesh::clustered;
-use crate::volume::{Padding, Subdivided, bounded_marching_cubes, voxels_inside};
+use crate::volume::{
+    Grid, Padding, Region, Slices, Subdivided, VolumeError, marching_cubes_in_slices, voxels_inside,
+};
 use std::borrow::Cow;
 
 /// The largest number of triangles of a contour: a model of more would need more memory than a page has. Noise without
@@ -80,20 +83,24 @@ pub(super) const SMALL_PART: f64 = 8.0;
 /// Extracts the iso-surface of a pyramid level in model space, closed and facing away from the object. Closed parts, of
 /// the object or around cavities, that enclose less than `smallest_part`, in model units, are left out; if
 /// none remains, the mesh is empty.
-pub(super) fn contour(
+pub(super) async fn contour(
     image: &LevelImage,
     iso: f32,
     object: ObjectIs,
     smallest_part: f64,
+    pauses: &Pauses,
 ) -> Result<TriangleMesh, MethodError> {
     let (grid, position) = image.part_grid();
-    let surface = contour_of_grid(&grid, iso, object)?;
+    let surface = contour_in_slices(&grid, iso, object, pauses).await?;
+    pauses.now().await;
     if smallest_part > SMALL_PART {
         return Ok(placed(surface, position).without_components_below(smallest_part));
     }
     let component = surface.component_of_each_vertex();
+    pauses.now().await;
     let part = 1.0 / image.part_scale().as_dvec3().element_product();
     let sizes = sizes_of_parts(&surface, &component, smallest_part / part);
+    pauses.now().await;
     let kept = surface.components_where(|v| sizes[component[v as usize] as usize] >= smallest_part / part);
     Ok(placed(kept, position))
 }
@@ -137,11 +144,39 @@ pub(super) fn contour_of_grid(
     iso: f32,
     object: ObjectIs,
 ) -> Result<TriangleMesh, MethodError> {
-    let negated = |z: usize| Cow::Owned(grid.slice(z).iter().map(|value| -value).collect());
+    finished(contour_in_slices(grid, iso, object, &Pauses::default()))
+}
+
+/// Does what [`contour_of_grid`] does, and pauses meanwhile.
+pub(super) async fn contour_in_slices(
+    grid: &Subdivided<'_>,
+    iso: f32,
+    object: ObjectIs,
+    pauses: &Pauses,
+) -> Result<TriangleMesh, MethodError> {
     Ok(match object {
-        ObjectIs::Brighter => bounded_marching_cubes(grid.dims(), iso, MOST_TRIANGLES, &|z| grid.slice(z))?,
-        ObjectIs::Darker => bounded_marching_cubes(grid.dims(), -iso, MOST_TRIANGLES, &negated)?,
+        ObjectIs::Brighter => marching_cubes_in_slices(grid, iso, MOST_TRIANGLES, pauses).await?,
+        ObjectIs::Darker => marching_cubes_in_slices(&Negated(grid), -iso, MOST_TRIANGLES, pauses).await?,
     })
+}
+
+/// A grid with all intensities negated.
+struct Negated<'a>(&'a Subdivided<'a>);
+
+impl Slices for Negated<'_> {
+    fn dims(&self) -> [usize; 3] {
+        self.0.dims()
+    }
+
+    fn slice(&self, z: usize) -> Result<Cow<'_, [f32]>, VolumeError> {
+        Ok(self.0.slice(z).iter().map(|value| -value).collect())
+    }
+
+    fn region(&self, region: Region) -> Result<Grid, VolumeError> {
+        let mut part = self.0.region(region)?;
+        part.values.iter_mut().for_each(|value| *value = -*value);
+        Ok(part)
+    }
 }
 
 /// Simplifies a contour by clustering, which saves more than half of the edits that bring its edges within bounds:

@@ -3,11 +3,16 @@
 
 use super::DeformableModel;
 use super::contour::{ObjectIs, contour};
+use super::image::LevelImage;
 use crate::math::order::{rank_f64, sort_by_rank};
 use crate::math::{DAffine3, DVec3, Vec3, triangle};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
+use crate::pauses::{Computation, Pauses, advance, finished};
 use crate::spatial::TriangleTree;
+use std::cell::Cell;
+use std::rc::Rc;
+use std::task::Poll;
 
 /// The distance to the other surface, of model and iso-surface, up to which a point is covered, in voxels of the finest
 /// level, or in the parts into which elongated ones are divided.
@@ -57,17 +62,46 @@ pub enum Missing {
     Cavity,
 }
 
-/// A measurement of [`Coverage`] that is advanced in slices of work, so that it does not block the caller; it refers to
-/// the surface at the time it began.
-#[derive(Clone, Debug)]
+/// A measurement of [`Coverage`] in slices of work, so that it does not block the caller; it refers to the surface at the
+/// time it began.
 pub struct CoverageSurvey {
+    measurement: Computation<Result<Coverage, MethodError>>,
+    /// The share of all triangles tested so far.
+    share: Rc<Cell<f64>>,
+}
+
+impl CoverageSurvey {
+    /// Does a slice of the work; returns the coverage at the end, after which this must not be called any more.
+    ///
+    /// # Errors
+    /// If the iso-surface or its search tree does not fit into memory.
+    pub fn advance(&mut self) -> Poll<Result<Coverage, MethodError>> {
+        advance(&mut self.measurement)
+    }
+
+    /// Returns the progress from 0 to 1.
+    pub fn share(&self) -> f64 {
+        self.share.get()
+    }
+}
+
+/// The surface whose coverage is measured, and the image whose iso-surface it is compared with.
+struct Measured {
+    image: LevelImage,
+    iso: f32,
+    object: ObjectIs,
+    smallest_part: f64,
+    model: TriangleMesh,
+    to_world: DAffine3,
+}
+
+/// The two surfaces, and what has been found of them.
+struct Comparison {
     to_world: DAffine3,
     iso_surface: TriangleMesh,
     iso_tree: TriangleTree,
     model: TriangleMesh,
     model_tree: TriangleTree,
-    /// The number of triangles tested so far, first of the iso-surface, then of the model.
-    tested: usize,
     /// By triangle of the iso-surface, for those tested so far: whether all of it is within one voxel of the model.
     is_covered: Vec<bool>,
     /// Covered area and total area of the triangles tested so far, in square world units, of the iso-surface and of the
@@ -79,23 +113,12 @@ impl DeformableModel {
     /// Begins to measure [`Coverage`]; [`CoverageSurvey::advance`] does the work in slices.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] on a sparse volume; if the iso-surface or its search tree does not fit into memory.
+    /// [`MethodError::InvalidArgument`] on a sparse volume.
     pub fn survey_coverage(&self) -> Result<CoverageSurvey, MethodError> {
-        self.check_is_whole()?;
-        let iso = self.pyramid.iso(&self.params);
-        let object = ObjectIs::by(&self.params);
-        let iso_surface = contour(&self.pyramid.levels[0], iso, object, self.smallest_part())?;
-        let model = self.mesh.to_triangles();
-        Ok(CoverageSurvey {
-            to_world: self.to_world,
-            iso_tree: TriangleTree::new(&iso_surface)?,
-            model_tree: TriangleTree::new(&model)?,
-            is_covered: Vec::with_capacity(iso_surface.triangles.len()),
-            iso_surface,
-            model,
-            tested: 0,
-            areas: [[0.0; 2]; 2],
-        })
+        let (measured, share) = (self.measured()?, Rc::new(Cell::new(0.0)));
+        let shown = share.clone();
+        let measurement = async move { measured.coverage(&shown, &Pauses::default()).await };
+        Ok(CoverageSurvey { measurement: Box::pin(measurement), share })
     }
 
     /// Measures [`Coverage`] in one call.
@@ -103,29 +126,58 @@ impl DeformableModel {
     /// # Errors
     /// [`MethodError::InvalidArgument`] on a sparse volume; if the iso-surface or its search tree does not fit into memory.
     pub fn coverage(&self) -> Result<Coverage, MethodError> {
-        let mut survey = self.survey_coverage()?;
-        survey.advance(usize::MAX);
-        Ok(survey.finish())
+        finished(self.measured()?.coverage(&Cell::default(), &Pauses::default()))
+    }
+
+    fn measured(&self) -> Result<Measured, MethodError> {
+        self.check_is_whole()?;
+        Ok(Measured {
+            image: self.pyramid.levels[0].clone(),
+            iso: self.pyramid.iso(&self.params),
+            object: ObjectIs::by(&self.params),
+            smallest_part: self.smallest_part(),
+            model: self.mesh.to_triangles(),
+            to_world: self.to_world,
+        })
     }
 }
 
-impl CoverageSurvey {
-    /// Tests at most `triangles` more triangles, and returns the progress from 0 to 1: the share of all triangles
-    /// tested so far.
-    pub fn advance(&mut self, triangles: usize) -> f64 {
+impl Measured {
+    async fn coverage(self, share: &Cell<f64>, pauses: &Pauses) -> Result<Coverage, MethodError> {
+        let Self { image, iso, object, smallest_part, model, to_world } = self;
+        let iso_surface = contour(&image, iso, object, smallest_part, pauses).await?;
+        drop(image);
+        pauses.now().await;
+        let mut comparison = Comparison {
+            to_world,
+            iso_tree: TriangleTree::in_slices(&iso_surface, pauses).await?,
+            model_tree: TriangleTree::in_slices(&model, pauses).await?,
+            is_covered: Vec::with_capacity(iso_surface.triangles.len()),
+            iso_surface,
+            model,
+            areas: [[0.0; 2]; 2],
+        };
+        comparison.test_all(share, pauses).await;
+        let share_of = |[covered, whole]: [f64; 2]| if whole > 0.0 { covered / whole } else { 1.0 };
+        let [recall, precision] = comparison.areas.map(share_of);
+        Ok(Coverage { recall, precision, uncovered: comparison.uncovered_regions(pauses).await })
+    }
+}
+
+impl Comparison {
+    async fn test_all(&mut self, share: &Cell<f64>, pauses: &Pauses) {
         let [of_iso, of_model] = [&self.iso_surface, &self.model].map(|mesh| mesh.triangles.len());
-        let all = of_iso + of_model;
-        let end = self.tested.saturating_add(triangles).min(all);
-        for t in self.tested..end {
+        for t in 0..of_iso + of_model {
             if t < of_iso {
                 let covered = self.test(0, t);
                 self.is_covered.push(covered);
             } else {
                 self.test(1, t - of_iso);
             }
+            share.set((t + 1) as f64 / (of_iso + of_model) as f64);
+            pauses.after(1).await;
         }
-        self.tested = end;
-        if all == 0 { 1.0 } else { end as f64 / all as f64 }
+        share.set(1.0);
     }
 
     /// Tests triangle `t` of the iso-surface (`which` 0) or of the model (1) piece by piece, adds its covered and total
@@ -146,17 +198,7 @@ impl CoverageSurvey {
         covered == count
     }
 
-    /// Returns the measured [`Coverage`]; all triangles must have been tested.
-    pub fn finish(self) -> Coverage {
-        let share = |[covered, whole]: [f64; 2]| if whole > 0.0 { covered / whole } else { 1.0 };
-        Coverage {
-            recall: share(self.areas[0]),
-            precision: share(self.areas[1]),
-            uncovered: self.uncovered_regions(),
-        }
-    }
-
-    fn uncovered_regions(&self) -> Vec<UncoveredRegion> {
+    async fn uncovered_regions(&self, pauses: &Pauses) -> Vec<UncoveredRegion> {
         let uncovered =
             self.iso_surface.triangles.iter().zip(&self.is_covered).filter(|(_, covered)| !**covered);
         let rest = TriangleMesh {
@@ -164,7 +206,9 @@ impl CoverageSurvey {
             triangles: uncovered.map(|(triangle, _)| *triangle).collect(),
             ..TriangleMesh::default()
         };
+        pauses.now().await;
         let part_of = rest.component_of_each_vertex();
+        pauses.now().await;
         let mut sums = vec![(DVec3::ZERO, 0.0); rest.positions.len()];
         let area_and_middle = |corners: [Vec3; 3]| {
             let [a, b, c] = corners.map(|p| self.to_world.transform_point3(p.as_dvec3()));
@@ -176,6 +220,7 @@ impl CoverageSurvey {
             *sum += middle * area;
             *total += area;
         }
+        pauses.now().await;
         let mut nearest: Vec<Option<(f64, Vec3, DVec3)>> = vec![None; sums.len()];
         for (t, corners) in rest.corners().enumerate() {
             let part = part_of[rest.triangles[t][0] as usize] as usize;
@@ -187,13 +232,15 @@ impl CoverageSurvey {
                 nearest[part] = Some((distance, (a + b + c) / 3.0, middle));
             }
         }
-        let found = nearest.into_iter().zip(&sums).filter_map(|(nearest, (_, area))| {
-            let (_, local, position) = nearest?;
+        pauses.now().await;
+        let mut parts = Vec::new();
+        for (nearest, (_, area)) in nearest.into_iter().zip(&sums) {
+            let Some((_, local, position)) = nearest else { continue };
             let kind = if self.is_inside_model(local) { Missing::Cavity } else { Missing::Matter };
-            Some(UncoveredRegion { position, area: *area, kind })
-        });
-        let mut parts: Vec<UncoveredRegion> = found.collect();
-        sort_by_rank(&mut parts, |part| !rank_f64(part.area));
+            parts.push(UncoveredRegion { position, area: *area, kind });
+            pauses.after(1).await;
+        }
+        sort_by_rank(&mut parts, |part: &UncoveredRegion| !rank_f64(part.area));
         parts
     }
 

@@ -4,8 +4,6 @@
 //! way); an affine map leads to world space. Voxels that are too long for that are divided into equal parts along their
 //! long sides, and the parts count as cubes. Their intensities are those of trilinear interpolation, and are not stored.
 
-use std::borrow::Cow;
-use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::DeformableParams;
@@ -247,12 +245,10 @@ impl LevelImage {
     /// are none. It is used as the mean intensity of the background.
     pub(super) fn mean_beyond(&self, iso: f32, above: bool) -> Option<f32> {
         let (mut sum, mut count) = (0.0, 0);
-        for z in 0..self.dims()[2] {
-            for &value in self.grid.slice(z).iter() {
-                if if above { value > iso } else { value < iso } {
-                    sum += f64::from(value);
-                    count += 1;
-                }
+        for part in self.grid.parts(BLOCK) {
+            for &value in part.iter().filter(|&&value| if above { value > iso } else { value < iso }) {
+                sum += f64::from(value);
+                count += 1;
             }
         }
         (count > 0).then(|| (sum / f64::from(count)) as f32)
@@ -305,18 +301,22 @@ impl LevelImage {
             let iso_crossings = a.iter().zip(b).filter(|&(&a, &b)| (a < iso) != (b < iso));
             iso_crossings.for_each(|(&a, &b)| visit((a - b) / parts[axis]));
         };
-        let mut slice = self.grid.slice(0);
-        for z in 0..nz {
-            let next = if z + 1 < nz { self.grid.slice(z + 1) } else { Cow::default() };
-            let rows: Vec<&[f32]> = slice.chunks_exact(nx).collect();
-            for (y, row) in rows.iter().enumerate() {
+        let (rows, block) = (ny * nz, (BLOCK / nx).max(1));
+        for first in (0..rows).step_by(block) {
+            let end = rows.min(first + block);
+            let here = self.grid.values(first * nx..rows.min(end + 1) * nx);
+            let above = self.grid.values(rows.min(first + ny) * nx..rows.min(end + ny) * nx);
+            for k in first..end {
+                let at = |k: usize| (k - first) * nx..(k + 1 - first) * nx;
+                let row = &here[at(k)];
                 pass(&row[1..], row, 0);
-                if y + 1 < ny {
-                    pass(rows[y + 1], row, 1);
+                if k % ny + 1 < ny {
+                    pass(&here[at(k + 1)], row, 1);
                 }
-                pass(next.get(y * nx..(y + 1) * nx).unwrap_or_default(), row, 2);
+                if k / ny + 1 < nz {
+                    pass(&above[at(k)], row, 2);
+                }
             }
-            slice = next;
         }
     }
 
@@ -344,6 +344,9 @@ impl LevelImage {
         self.grid.dims()
     }
 }
+
+/// The number of voxels that a pass over the image reads at a time: a whole slice may be as large as the volume.
+const BLOCK: usize = 1 << 14;
 
 /// Number of voxels of a pass over the image that count as one unit of work between pauses.
 const VOXELS_PER_UNIT: usize = 512;
@@ -429,7 +432,7 @@ impl Pyramid {
         let hash = hash_of(&grid, Region { min: [0; 3], dims: volume.dims() });
         let volume_range = [volume.range()[0], volume.span()];
         let divided = [0, 1, 2].map(|axis| grid.dims()[axis] * parts[axis]);
-        let is_flat = (0..grid.dims()[2]).all(|z| grid.slice(z).iter().all(|&value| value == grid.value(0)));
+        let is_flat = grid.parts(BLOCK).all(|part| part.iter().all(|&value| value == grid.value(0)));
         pauses.after(pass).await;
         let mut pyramid = Self {
             levels: vec![LevelImage::new(grid, parts, divided)],
@@ -799,11 +802,11 @@ fn spacing_of(affine: &DAffine3) -> [f64; 3] {
 
 /// Returns the sum of the hashes of the voxels of a grid in a region.
 fn hash_of(grid: &FrameGrid, region: Region) -> u64 {
-    let of_row = |row: Range<usize>| {
-        let values = grid.values(row.clone());
-        row.zip(values.iter()).fold(0, |sum: u64, (k, &value)| sum.wrapping_add(hash_of_voxel(k, value)))
-    };
-    region.rows(grid.dims(), 0).map(of_row).fold(0, u64::wrapping_add)
+    let mut buffer = Vec::new();
+    region.rows(grid.dims(), 0).fold(0, |sum, row| {
+        let values = grid.values_in(row.clone(), &mut buffer);
+        row.zip(values).fold(sum, |sum: u64, (k, &value)| sum.wrapping_add(hash_of_voxel(k, value)))
+    })
 }
 
 /// Returns the hash of one voxel, given its index in the grid and its intensity. The hashes of an image are added up, so

@@ -70,7 +70,7 @@ impl DeformableModel {
         let level = self.pyramid.levels.len() - 1;
         let delta = self.pyramid.delta_at(self.finest_delta, level);
         let context = StartContext::of(&self.pyramid, &self.params, self.domain, delta, &self.to_world);
-        let Some(mut mesh) = contour_mesh(&context)? else {
+        let Some(mut mesh) = finished(contour_mesh(&context, &Pauses::default()))? else {
             self.prepare_level()?;
             self.wake_all();
             return Ok(());

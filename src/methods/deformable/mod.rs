@@ -330,7 +330,7 @@ impl DeformableModel {
         let domain = Domain::new(pyramid.dims(), delta);
         let context = StartContext::of(&pyramid, &params, domain, delta, &to_world);
         let from_contour = start == Start::Contour;
-        let contour = if from_contour { contour_mesh(&context)? } else { None };
+        let contour = if from_contour { contour_mesh(&context, pauses).await? } else { None };
         pauses.now().await;
         let begins_on_contour = contour.is_some();
         let mut mesh = match contour {

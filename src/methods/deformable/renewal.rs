@@ -39,7 +39,7 @@ impl DeformableModel {
         let (level, object) = (self.level - 1, ObjectIs::by(&self.params));
         let image = &self.pyramid.levels[level];
         let iso = self.pyramid.iso(&self.params);
-        let contour = contour(image, iso, object, self.smallest_part())?;
+        let contour = contour(image, iso, object, self.smallest_part(), pauses).await?;
         pauses.now().await;
         let covered = COVERED_DISTANCE / image.voxels_per_unit();
         let (removed, added) = self.components_to_replace(&contour, covered, pauses).await?;

@@ -1,6 +1,6 @@
 //! Start surfaces (section 3.6): made in model space, with their edges brought within bounds before the first step.
 
-use super::contour::{ObjectIs, contour, placed, simplified};
+use super::contour::{ObjectIs, contour, contour_in_slices, placed, simplified};
 use super::domain::{Domain, rounded_axes};
 use super::image::{LevelImage, Pyramid};
 use super::{DeformableModel, DeformableParams, Seeding, coarse, image_guide};
@@ -11,7 +11,6 @@ use crate::methods::caller_mesh::checked_mesh;
 use crate::pauses::Pauses;
 use crate::remesh::{Pending, Resolver, Sampling, TopologyGuide, Unguided};
 use crate::spatial::CellSet;
-use crate::volume::marching_cubes_of_slices;
 
 /// The start surface of a run; lengths and points are in world space.
 #[derive(Clone, Debug, PartialEq)]
@@ -149,7 +148,7 @@ impl Start {
             Self::Contour | Self::Enclosing => enclosing(context, pauses).await?,
             Self::Bubbles(n) => bubble_grid(context, *n)?,
             Self::Seeds { points, radius } => spheres_at(context, points, *radius)?,
-            Self::MarchingCubes(value) => iso_surface(context, iso(*value))?,
+            Self::MarchingCubes(value) => iso_surface(context, iso(*value), pauses).await?,
             Self::Mesh(mesh) => caller_mesh(context, mesh)?,
         };
         let most = context.most_vertices();
@@ -404,18 +403,23 @@ fn largest(spacing: [f64; 3]) -> f64 {
 
 /// Makes the simplified contour at the iso value π_I of the start level, for [`DeformableModel::resolve_contour`]. If
 /// it is empty: an empty mesh if [`StartContext::may_be_empty`], else `None`.
-pub(super) fn contour_mesh(context: &StartContext) -> Result<Option<Mesh>, MethodError> {
-    let surface = contour(context.image, context.iso, context.object, context.smallest_part)?;
+pub(super) async fn contour_mesh(
+    context: &StartContext<'_>,
+    pauses: &Pauses,
+) -> Result<Option<Mesh>, MethodError> {
+    let surface = contour(context.image, context.iso, context.object, context.smallest_part, pauses).await?;
+    pauses.now().await;
     if surface.triangles.is_empty() {
         return Ok(context.may_be_empty.then(Mesh::default));
     }
     let surface = simplified(surface, context.image, context.sampling.shortest());
+    pauses.now().await;
     Ok(Some(Mesh::from_triangles(&surface)?))
 }
 
-fn iso_surface(context: &StartContext, iso: f32) -> Result<Mesh, MethodError> {
+async fn iso_surface(context: &StartContext<'_>, iso: f32, pauses: &Pauses) -> Result<Mesh, MethodError> {
     let (grid, position) = context.image.part_grid();
-    let surface = marching_cubes_of_slices(grid.dims(), iso, &|z| grid.slice(z))?;
+    let surface = contour_in_slices(&grid, iso, ObjectIs::Brighter, pauses).await?;
     if surface.triangles.is_empty() {
         return Err(MethodError::invalid(
             "start.marchingCubes",

@@ -10,6 +10,7 @@ use super::{Embedding, Nearby};
 use crate::math::higher;
 use crate::mesh::{Mesh, VertexId, sort_distinct};
 use crate::pauses::{Pauses, finished};
+use std::ops::Range;
 
 /// The clearance of a pair, relative to the ordinary edge, above which no further filter is tried.
 const AMPLE: f32 = 0.03;
@@ -26,6 +27,12 @@ const PAIRS_PER_UNIT: usize = 16;
 /// The largest number of vertices near one that are looked through for another: where a mesh intersects itself
 /// everywhere, time would be cubic.
 const MOST_CERTIFIED: usize = 256;
+
+/// The valence above which a ring is tested in parts, of about the square of it in pairs of triangles.
+const WIDE: usize = 128;
+
+/// The number of corners found, for each vertex of the mesh, among which many have been found before.
+const REPEATED: usize = 16;
 
 /// The checks that test pairs of triangles.
 const PAIRS: [Check; 2] = [Check::OneRing, Check::Nearby];
@@ -73,12 +80,17 @@ impl Embedding {
         while !left.as_slice().is_empty() {
             let mut pairs = 0;
             for &v in left.by_ref().take(CHUNK) {
-                pairs += self.check_vertex(mesh, v, &mut intersecting);
+                pairs += if mesh.ring(v).valence() > WIDE {
+                    self.check_wide_ring(mesh, v, &mut intersecting, pauses).await
+                } else {
+                    self.check_vertex(mesh, v, &mut intersecting)
+                };
                 if pairs >= MANY_PAIRS {
                     break;
                 }
             }
             pauses.after(pairs / PAIRS_PER_UNIT).await;
+            keep_few(&mut intersecting, mesh);
         }
         dirty.iter().for_each(|v| self.pending[v.index()] = Checks::default());
         self.tolerated.remove_from(&mut intersecting);
@@ -86,25 +98,72 @@ impl Embedding {
         intersecting
     }
 
+    /// Does what [`Self::check_vertex`] does, with pauses between parts of the ring: each triangle is tested with all others,
+    /// and there may be thousands.
+    async fn check_wide_ring(
+        &mut self,
+        mesh: &Mesh,
+        v: VertexId,
+        intersecting: &mut Vec<VertexId>,
+        pauses: &Pauses,
+    ) -> usize {
+        let valence = mesh.ring(v).valence();
+        // Of each triangle with all others, and of the four or more at a neighbour with all.
+        let work = |part: Range<usize>| part.len() * valence / PAIRS_PER_UNIT;
+        let step = (WIDE * WIDE / valence).max(1);
+        let parts = |count: usize| (0..count).step_by(step).map(move |first| first..count.min(first + step));
+        if self.pending[v.index()].has(Check::OneRing) {
+            if self.lacks_clearance_around(mesh, v) {
+                pauses.after(work(0..valence)).await;
+                for part in parts(valence) {
+                    intersections_around(mesh, v, part.clone(), self.output.as_ref(), intersecting);
+                    keep_few(intersecting, mesh);
+                    pauses.after(work(part)).await;
+                }
+            }
+            for part in parts(valence) {
+                self.check_along_edges(mesh, v, part.clone(), intersecting);
+                keep_few(intersecting, mesh);
+                pauses.after(work(part)).await;
+            }
+        }
+        if !self.pending[v.index()].has(Check::Nearby) {
+            return 0;
+        }
+        for part in parts(self.near(v).len()) {
+            self.check_nearby(mesh, v, part.clone(), intersecting);
+            keep_few(intersecting, mesh);
+            pauses.after(work(part)).await;
+        }
+        self.near(v).len()
+    }
+
     /// Runs the pending collision checks of a vertex; returns about how many pairs were tested.
     fn check_vertex(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) -> usize {
         let pending = self.pending[v.index()];
         let mut pairs = 0;
         if pending.has(Check::OneRing) {
-            self.check_one_ring(mesh, v, intersecting);
-            self.check_along_edges(mesh, v, intersecting);
-            pairs += mesh.ring(v).valence();
+            let valence = mesh.ring(v).valence();
+            if self.lacks_clearance_around(mesh, v) {
+                intersections_around(mesh, v, 0..valence, self.output.as_ref(), intersecting);
+            }
+            self.check_along_edges(mesh, v, 0..valence, intersecting);
+            pairs += valence;
         }
         if pending.has(Check::Nearby) {
-            self.check_nearby(mesh, v, intersecting);
-            pairs += self.near(v).len();
+            let near = self.near(v).len();
+            self.check_nearby(mesh, v, 0..near, intersecting);
+            pairs += near;
         }
         pairs
     }
 
-    fn check_one_ring(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) {
+    /// Lowers the motion bounds of a vertex to the clearance between the triangles at it; returns whether there is none,
+    /// so that they have to be tested.
+    fn lacks_clearance_around(&mut self, mesh: &Mesh, v: VertexId) -> bool {
         if let Some(left) = self.certificates.left_of_own(v) {
-            return self.lower_bounds(Check::OneRing, [v, v], left);
+            self.lower_bounds(Check::OneRing, [v, v], left);
+            return false;
         }
         let longest = self.longest[v.index()];
         let mut clearance = flat_clearance(mesh, v, longest);
@@ -114,16 +173,21 @@ impl Embedding {
         let clearance = self.or_zero(clearance);
         self.lower_bounds(Check::OneRing, [v, v], clearance);
         self.certificates.set_own(v, clearance);
-        if clearance == 0.0 {
-            intersections_around(mesh, v, self.output.as_ref(), intersecting);
-        }
+        clearance == 0.0
     }
 
-    fn check_along_edges(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) {
+    /// Checks the pairs of a vertex and its neighbours with the given numbers in its ring.
+    fn check_along_edges(
+        &mut self,
+        mesh: &Mesh,
+        v: VertexId,
+        neighbours: Range<usize>,
+        intersecting: &mut Vec<VertexId>,
+    ) {
         let ring = mesh.ring(v).as_slice();
-        let mut right = ring[ring.len() - 1];
-        for (k, &w) in ring.iter().enumerate() {
-            let left = ring[if k + 1 == ring.len() { 0 } else { k + 1 }];
+        let mut right = ring[if neighbours.start == 0 { ring.len() } else { neighbours.start } - 1];
+        for k in neighbours {
+            let (w, left) = (ring[k], ring[if k + 1 == ring.len() { 0 } else { k + 1 }]);
             if let Some(remaining) = self.certificates.left_along([v, w], k) {
                 self.lower_bounds(Check::OneRing, [v, w], remaining);
             } else if !self.is_checked_from(w, v, Check::OneRing) {
@@ -147,8 +211,15 @@ impl Embedding {
         self.or_triangle_clearance(mesh, pair, clearance)
     }
 
-    fn check_nearby(&mut self, mesh: &Mesh, v: VertexId, intersecting: &mut Vec<VertexId>) {
-        for k in 0..self.near(v).len() {
+    /// Checks the pairs of a vertex and those near it with the given numbers in its list.
+    fn check_nearby(
+        &mut self,
+        mesh: &Mesh,
+        v: VertexId,
+        near: Range<usize>,
+        intersecting: &mut Vec<VertexId>,
+    ) {
+        for k in near {
             let Nearby { vertex: w, until } = self.near(v)[k];
             // Edits may have changed either vertex since the pair was found.
             if !mesh.is_live(w) || w == v || mesh.ring(v).contains(w) {
@@ -240,6 +311,14 @@ impl Embedding {
     fn longest_of(&self, v: VertexId, w: VertexId) -> f32 {
         let (a, b) = (self.longest[v.index()], self.longest[w.index()]);
         if a > b { a } else { b }
+    }
+}
+
+/// Removes what is found several times from the corners of intersecting triangles, if they are many: where a mesh
+/// intersects itself everywhere, each is found thousands of times.
+fn keep_few(intersecting: &mut Vec<VertexId>, mesh: &Mesh) {
+    if intersecting.len() > REPEATED * mesh.vertex_count() {
+        sort_distinct(intersecting);
     }
 }
 

@@ -10,6 +10,7 @@ use super::output::{OutputSpace, bounds, exact_below, intersect};
 use crate::math::{Bounds, DVec3, Vec3, higher, lower};
 use crate::mesh::{Facet, Mesh, VertexId};
 use smallvec::SmallVec;
+use std::ops::Range;
 
 /// The valence up to which one-rings are stored inline, without heap allocation.
 pub(super) const ORDINARY_RING: usize = 16;
@@ -221,16 +222,18 @@ fn gap(mesh: &Mesh, [u, v]: [VertexId; 2], in_plane: [VertexId; 2], origin: Vec3
     least
 }
 
-/// Appends to `intersecting` the corners of all pairs of triangles at `v` that intersect beyond their common corners;
-/// exact.
+/// Appends to `intersecting` the corners of all pairs of triangles at `v` that intersect beyond their common corners, of
+/// which one is among the `later`, numbers in the ring, and the other comes before it; exact.
 pub(super) fn intersections_around(
     mesh: &Mesh,
     v: VertexId,
+    later: Range<usize>,
     output: Option<&OutputSpace>,
     intersecting: &mut Vec<VertexId>,
 ) {
     let facets: Vec<Facet> = facets_at(mesh, v).collect();
-    for (k, s) in facets.iter().enumerate() {
+    for k in later {
+        let s = &facets[k];
         for t in facets[..k].iter().filter(|t| intersect(s, t, output)) {
             intersecting.extend(s.corners.into_iter().chain(t.corners).map(VertexId));
         }
