@@ -57,7 +57,9 @@ impl From<MeshError> for Failure {
             MeshError::SelfIntersecting { .. } | MeshError::CannotCut => "self-intersecting",
             MeshError::Precision { .. } => "precision",
             MeshError::NoProgress { .. } => "no-progress",
-            MeshError::TooManyVertices { .. } | MeshError::TooLarge { .. } => "too-large",
+            MeshError::TooManyVertices { .. } | MeshError::TooLarge { .. } | MeshError::TooCrowded { .. } => {
+                "too-large"
+            }
         };
         Self::new(code, error.to_string())
     }

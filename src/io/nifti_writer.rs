@@ -2,7 +2,7 @@
 
 use super::FormatError;
 use super::nifti::{FORMAT, SIZE_1, SIZE_2};
-use super::raw::{append_voxels, number_size};
+use super::raw::append_voxels;
 use crate::math::{DVec3, box_corners};
 use crate::volume::{LengthUnit, Space, Volume, Voxels};
 
@@ -31,7 +31,7 @@ const SHIFT_TOLERANCE: f64 = 1e-3;
 pub fn write_nifti(volume: &Volume) -> Result<Vec<u8>, FormatError> {
     let [nx, ny, nz] = volume.dims();
     let dims = [nx, ny, nz, volume.frames()];
-    let (code, size) = (datatype(volume.voxels()), number_size(volume.voxels()));
+    let (code, size) = (datatype(volume.voxels()), volume.voxels().number_size());
     let total = OFFSET_2 + size * volume.voxels().len();
     let mut out = Vec::new();
     out.try_reserve_exact(total).map_err(|_| FormatError::too_large(FORMAT, "file", total as u64))?;

@@ -179,16 +179,6 @@ fn check_exact(name: FieldName, bytes: &[u8], size: impl Fn([u8; 8]) -> u64) -> 
     }
 }
 
-/// Returns the size in bytes of a stored voxel.
-pub(super) fn number_size(voxels: &Voxels) -> usize {
-    match voxels {
-        Voxels::U8(_) | Voxels::I8(_) => 1,
-        Voxels::U16(_) | Voxels::I16(_) => 2,
-        Voxels::U32(_) | Voxels::I32(_) | Voxels::F32(_) => 4,
-        Voxels::F64(_) => 8,
-    }
-}
-
 /// Appends the voxels to the bytes of a file, as little-endian numbers.
 pub(super) fn append_voxels(out: &mut Vec<u8>, voxels: &Voxels) {
     match voxels {

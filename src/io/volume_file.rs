@@ -1,7 +1,7 @@
 //! Writing of volumes in any of the formats.
 
 use super::deflate::gzip;
-use super::raw::{append_voxels, number_size};
+use super::raw::append_voxels;
 use super::{FormatError, metaimage_writer, nifti, nrrd, write_nifti};
 use crate::volume::{Volume, Voxels};
 
@@ -69,7 +69,7 @@ pub(super) fn with_voxels(
     voxels: &Voxels,
 ) -> Result<Vec<u8>, FormatError> {
     let mut out = header.into_bytes();
-    let size = voxels.len().saturating_mul(number_size(voxels));
+    let size = voxels.len().saturating_mul(voxels.number_size());
     out.try_reserve_exact(size).map_err(|_| FormatError::too_large(format, "voxels", size as u64))?;
     append_voxels(&mut out, voxels);
     Ok(out)

@@ -52,6 +52,15 @@ pub enum MeshError {
         /// The number of vertices that would be needed, estimated where it is not known in advance.
         vertices: u64,
     },
+    /// So many vertices are near each other that there is not enough memory to test their triangles for intersections.
+    #[error(
+        "too many vertices of the mesh are near each other (over {pairs} pairs): it intersects itself in many places, or its edges \
+         differ too much in length"
+    )]
+    TooCrowded {
+        /// The number of pairs for which there is memory.
+        pairs: usize,
+    },
     /// A file of the mesh needs more memory than is left, or would exceed 4 GiB.
     #[error("the mesh needs {bytes} bytes, more than is left of the 4 GiB of WebAssembly")]
     TooLarge {

@@ -83,7 +83,7 @@ const ORDINARY_EDGE: f64 = 1.5;
 ///
 /// # Errors
 /// [`MeshError::InvalidArgument`] for more than [`Smoothing::MAX_ITERATIONS`] iterations, or if a position would leave
-/// the range of `f32`; the mesh is then unchanged.
+/// the range of `f32`; [`MeshError::TooCrowded`]. The mesh is then unchanged.
 pub fn smooth(mesh: &mut Mesh, smoothing: Smoothing) -> Result<(), MeshError> {
     finished(smooth_in_slices(mesh, smoothing, &Pauses::default()))
 }
@@ -121,6 +121,10 @@ pub async fn smooth_in_slices(
     if !smoother.move_to(mesh, &smoothed, iterations, pauses).await {
         smoother.run(mesh, iterations, pauses).await;
     }
+    if let Err(error) = smoother.check_pairs(mesh) {
+        mesh.positions_mut().iter_mut().zip(before).for_each(|(p, before)| *p = before * grow);
+        return Err(error);
+    }
     mesh.positions_mut().iter_mut().for_each(|p| *p *= grow);
     if mesh.positions().iter().all(|p| p.is_finite()) {
         return Ok(());
@@ -139,6 +143,7 @@ fn mean_edge(mesh: &Mesh) -> f64 {
 
 fn embedding_of(mesh: &Mesh, ordinary_edge: f32) -> Embedding {
     let mut embedding = Embedding::default();
+    embedding.set_limits_pairs(true);
     embedding.sync_with_edge(mesh, ordinary_edge);
     embedding
 }
@@ -242,6 +247,11 @@ impl Smoother {
         true
     }
 
+    /// Returns an error if the guard could not test all triangles.
+    fn check_pairs(&self, mesh: &Mesh) -> Result<(), MeshError> {
+        self.guard.as_ref().map_or(Ok(()), |guard| guard.check_pairs(mesh))
+    }
+
     /// Gives volume back where it was lost, if it is to be kept.
     async fn balance(&mut self, mesh: &mut Mesh, all: &[VertexId], pauses: &Pauses) {
         let Some(balance) = &mut self.balance else { return };
@@ -251,6 +261,9 @@ impl Smoother {
 
     /// Moves vertices, sorted by id, by their displacements, as far as the guard permits.
     async fn apply(&mut self, mesh: &mut Mesh, moving: &[VertexId], pauses: &Pauses) {
+        if self.check_pairs(mesh).is_err() {
+            return;
+        }
         if let Some(guard) = &mut self.guard {
             guard.move_some_in_slices(mesh, moving, &mut self.displacements, pauses).await;
             return;

@@ -90,23 +90,21 @@ impl Slices for Grid {
     }
 }
 
-/// A field whose axes are z, x and y of another.
+/// A field whose axes are x, z and y of another.
 struct Turned<'a>(&'a dyn Slices);
 
 impl Slices for Turned<'_> {
     fn dims(&self) -> [usize; 3] {
         let [nx, ny, nz] = self.0.dims();
-        [nz, nx, ny]
+        [nx, nz, ny]
     }
 
     fn slice(&self, y: usize) -> Result<Cow<'_, [f32]>, VolumeError> {
         let [nx, _, nz] = self.0.dims();
-        let section = self.0.region(Region { min: [0, y, 0], dims: [nx, 1, nz] })?;
-        let along_z = |x: usize| section.values[x..].iter().step_by(nx).copied();
-        Ok((0..nx).flat_map(along_z).collect())
+        Ok(self.0.region(Region { min: [0, y, 0], dims: [nx, 1, nz] })?.values.into())
     }
 
-    fn region(&self, Region { min: [z, x, y], dims: [nz, nx, ny] }: Region) -> Result<Grid, VolumeError> {
+    fn region(&self, Region { min: [x, z, y], dims: [nx, nz, ny] }: Region) -> Result<Grid, VolumeError> {
         self.0.region(Region { min: [x, y, z], dims: [nx, ny, nz] })
     }
 }
@@ -129,8 +127,20 @@ pub(crate) async fn marching_cubes_in_slices(
     if nx * ny <= LARGE_SLICE || ny <= nz {
         return slice_by_slice(field, iso, most, pauses).await;
     }
+    turned(field, iso, most, pauses).await
+}
+
+/// Extracts the iso-surface with slices across y.
+async fn turned(
+    field: &dyn Slices,
+    iso: f32,
+    most: usize,
+    pauses: &Pauses,
+) -> Result<TriangleMesh, VolumeError> {
     let mut mesh = slice_by_slice(&Turned(field), iso, most, pauses).await?;
-    mesh.positions.iter_mut().for_each(|p| *p = Vec3::new(p.y, p.z, p.x));
+    mesh.positions.iter_mut().for_each(|p| *p = Vec3::new(p.x, p.z, p.y));
+    // Exchanging two axes is a reflection.
+    mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
     Ok(mesh)
 }
 
@@ -378,11 +388,31 @@ fn filled<T: Clone>(value: T, count: usize) -> Result<Vec<T>, VolumeError> {
 mod tests {
     use super::*;
     use crate::math::{DMat3, DVec3, Random};
-    use crate::mesh::count_self_intersections;
+    use crate::mesh::{Mesh, count_self_intersections, measure};
     use crate::volume::{VolumeInit, Voxels};
     use std::collections::BTreeMap;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
+
+    #[test]
+    fn slices_across_another_axis_give_the_same_surface() {
+        let field = noise([9, 7, 3], 5, 4);
+        let none = Pauses::default();
+        let usual = finished(slice_by_slice(&field, 0.4, usize::MAX, &none)).unwrap();
+        let twice = Turned(&Turned(&field)).slice(1).unwrap().into_owned();
+        assert_eq!(twice, field.slice(1).unwrap().into_owned());
+        let turned = finished(turned(&field, 0.4, usize::MAX, &none)).unwrap();
+        let sorted = |mesh: &TriangleMesh| {
+            let mut bits: Vec<_> = mesh.positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
+            bits.sort_unstable();
+            bits
+        };
+        assert_eq!(sorted(&turned), sorted(&usual));
+        assert_eq!(count_self_intersections(&turned), 0);
+        let volume = |mesh: &TriangleMesh| measure(mesh).volume;
+        assert!(volume(&turned) > 0.0 && (volume(&turned) / volume(&usual) - 1.0).abs() < 0.05);
+        Mesh::from_triangles(&turned).unwrap();
+    }
 
     #[test]
     fn too_many_triangles_are_refused_by_their_number() {

@@ -24,6 +24,17 @@ pub enum Enrichment {
 /// add no information.
 const MAX_FACTOR: usize = 16;
 
+/// The largest size of the result, in bytes. A whole body in slices of 3 mm, enriched to the size of its pixels, has less;
+/// beside a larger one there is no memory to work with it.
+const MOST_BYTES: u64 = 768 << 20;
+
+/// Returns the number of voxels of the given dimensions; an error if they would take more than [`MOST_BYTES`].
+fn check_size(like: &Voxels, dims: [usize; 4]) -> Result<usize, VolumeError> {
+    let count = dims.iter().fold(1u64, |product, &n| product.saturating_mul(n as u64));
+    let bytes = count.saturating_mul(like.number_size() as u64);
+    if bytes > MOST_BYTES { Err(VolumeError::TooLarge { bytes }) } else { Ok(count as usize) }
+}
+
 impl Volume {
     /// Returns the volume with `factor` − 1 slices interpolated between each pair of neighbouring slices along the axis
     /// of the largest spacing.
@@ -33,7 +44,8 @@ impl Volume {
     /// changes nothing. Each frame is interpolated separately.
     ///
     /// # Errors
-    /// `factor` not in 1..=16; a single slice along that axis with a factor above 1; [`VolumeError::TooLarge`].
+    /// `factor` not in 1..=16; a single slice along that axis with a factor above 1; [`VolumeError::TooLarge`], also if the
+    /// result would take more than 768 MiB.
     pub fn enrich_slices(&self, factor: Option<usize>, method: Enrichment) -> Result<Volume, VolumeError> {
         finished(self.enrich_in_slices(factor, method, &Pauses::default()))
     }
@@ -64,12 +76,10 @@ impl Volume {
         }
         let mut dims = self.dims;
         dims[axis] = (count - 1) * factor + 1;
-        let mut frames = reserve(self.frames())?;
+        let mut voxels = self.voxels.zeros_like(check_size(&self.voxels, dims)?)?;
         for frame in 0..self.frames() {
-            frames.push(self.enriched_frame(frame, axis, factor, method, pauses).await?);
+            self.enrich_frame(frame, axis, factor, method, &mut voxels, pauses).await?;
         }
-        let parts: Vec<&Voxels> = frames.iter().collect();
-        let voxels = Voxels::concatenate(&parts)?.unwrap_or(Voxels::F32(Vec::new()));
         let mut ratio = DVec3::ONE;
         ratio[axis] = 1.0 / factor as f64;
         let volume = Volume::new(VolumeInit {
@@ -98,23 +108,24 @@ impl Volume {
         if self.dims[axis] < 2 || factor < 1.0 { 1 } else { factor.min(MAX_FACTOR as f64) as usize }
     }
 
-    /// Returns one frame, as stored values, with `factor` − 1 slices interpolated between each pair of neighbouring
-    /// slices along `axis`.
-    async fn enriched_frame(
+    /// Stores one frame in `voxels`, those of the result, with `factor` − 1 slices interpolated between each pair of
+    /// neighbouring slices along `axis`.
+    async fn enrich_frame(
         &self,
         frame: usize,
         axis: usize,
         factor: usize,
         method: Enrichment,
+        voxels: &mut Voxels,
         pauses: &Pauses,
-    ) -> Result<Voxels, VolumeError> {
+    ) -> Result<(), VolumeError> {
         let dims = self.dims();
         let start = self.frame_start(frame)?;
         let mut longer = dims;
         longer[axis] = (dims[axis] - 1) * factor + 1;
-        let mut voxels = self.voxels.zeros_like(longer.iter().product())?;
+        let first = frame * longer.iter().product::<usize>();
         let mut put = |slice, made: &Voxels| {
-            voxels.overwrite(slice_at(longer, axis, slice).rows(longer, 0), made);
+            voxels.overwrite(slice_at(longer, axis, slice).rows(longer, first), made);
         };
         let mut before = self.normalised_slice(frame, axis, 0)?;
         for slice in 0..dims[axis] {
@@ -143,7 +154,7 @@ impl Volume {
             }
             before = after;
         }
-        Ok(voxels)
+        Ok(())
     }
 
     /// Returns a slice as an image. The flow is computed on normalised intensities, which are finite even for NaN voxels.
@@ -319,6 +330,14 @@ mod tests {
         let Voxels::F32(values) = made.voxels() else { panic!() };
         assert!(values[1].is_nan() && values[7].is_infinite());
         assert!(values[3..6].iter().all(|v| (1.0..=5.0).contains(v)), "{values:?}");
+    }
+
+    #[test]
+    fn results_without_memory_to_work_with_them_are_refused_at_once() {
+        let volume = volume([300, 300, 1200, 1], [1.0, 1.0, 16.0], Voxels::U8(vec![1; 300 * 300 * 1200]));
+        let bytes = 300 * 300 * (1199 * 16 + 1);
+        let error = volume.enrich_slices(None, Enrichment::Linear).unwrap_err();
+        assert_eq!(error, VolumeError::TooLarge { bytes });
     }
 
     #[test]

@@ -148,6 +148,16 @@ impl Voxels {
         }
     }
 
+    /// Returns the size of a stored value in bytes.
+    pub(crate) fn number_size(&self) -> usize {
+        match self {
+            Voxels::U8(_) | Voxels::I8(_) => 1,
+            Voxels::U16(_) | Voxels::I16(_) => 2,
+            Voxels::U32(_) | Voxels::I32(_) | Voxels::F32(_) => 4,
+            Voxels::F64(_) => 8,
+        }
+    }
+
     /// Returns stored values in single precision.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use super::motion_bound::Check;
 use super::{Embedding, NEAREST_CORNER, Nearby, PIERCING, SEARCH_SKIN};
 use crate::math::order::{combined_rank, sort_ranks};
 use crate::math::{Bounds, Vec3};
-use crate::mesh::{Mesh, VertexId, sort_distinct};
+use crate::mesh::{Mesh, MeshError, VertexId, sort_distinct};
 use crate::pauses::Pauses;
 use crate::spatial::{Proximity, VertexBall, near_pairs};
 
@@ -15,6 +15,15 @@ const MANY: usize = 8;
 
 /// The number of pairs of vertices whose tests are a unit of work.
 const TESTS_PER_UNIT: usize = 256;
+
+/// The largest number of pairs of near vertices that a sweep stores, for each vertex and at least; each takes 16 bytes or
+/// more. Usual meshes have less than 20 a vertex; those with edges of very different lengths, or that intersect themselves
+/// everywhere, have thousands.
+const MOST_PAIRS: [usize; 2] = [32, 1 << 24];
+
+fn most_pairs(mesh: &Mesh) -> usize {
+    MOST_PAIRS[1].max(MOST_PAIRS[0].saturating_mul(mesh.vertex_count()))
+}
 
 impl Embedding {
     /// Measures the longest edge at each of the `dirty` vertices; for those with a pending search for non-adjacent
@@ -72,12 +81,31 @@ impl Embedding {
         let mut balls = Vec::with_capacity(mesh.vertices().filter(is_near).count());
         balls.extend(mesh.vertices().filter(is_near).map(|v| self.grid.ball(v)));
         pauses.now().await;
+        let most = if self.limits_pairs { most_pairs(mesh) } else { usize::MAX };
+        self.swept = 0;
         let add = |a: &VertexBall, b: &VertexBall| {
-            if self.is_searched_around(a.vertex) || self.is_searched_around(b.vertex) {
+            if self.swept < most && (self.is_searched_around(a.vertex) || self.is_searched_around(b.vertex)) {
                 self.add_pair(mesh, a, b, proximity);
+                self.swept += 1;
             }
         };
         near_pairs(balls, proximity, add, pauses).await;
+        self.is_crowded |= self.swept == most;
+    }
+
+    /// Sets whether sweeps end at the number of pairs of near vertices for which there is memory. If they do, the caller has
+    /// to ask [`Self::check_pairs`] after checks and moves.
+    pub fn set_limits_pairs(&mut self, limits_pairs: bool) {
+        self.limits_pairs = limits_pairs;
+    }
+
+    /// Returns an error if a sweep has found more pairs of near vertices than there is memory for; the results of checks and
+    /// moves since then are void.
+    ///
+    /// # Errors
+    /// [`MeshError::TooCrowded`].
+    pub fn check_pairs(&self, mesh: &Mesh) -> Result<(), MeshError> {
+        if self.is_crowded { Err(MeshError::TooCrowded { pairs: most_pairs(mesh) }) } else { Ok(()) }
     }
 
     /// Finds pairs of non-adjacent vertices near each other, of which at least one is `dirty` and has a pending search,

@@ -117,6 +117,12 @@ pub struct Embedding {
     output: Option<OutputSpace>,
     /// The parts of the mesh that may intersect in moves.
     tolerated: Tolerated,
+    /// Whether sweeps end at the number of pairs for which there is memory ([`Self::check_pairs`]).
+    limits_pairs: bool,
+    /// The number of pairs that the current sweep has found.
+    swept: usize,
+    /// Whether a sweep has found more pairs than there is memory for, so that intersections may not be found.
+    is_crowded: bool,
 }
 
 impl Embedding {

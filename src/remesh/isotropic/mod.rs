@@ -63,7 +63,8 @@ const INPUT_TEST_RUN: usize = 1;
 /// # Errors
 /// [`MeshError::InvalidArgument`] unless both bounds are finite, `min` is above 0 and `max` more than twice `min`;
 /// [`MeshError::Precision`] if `max` is below 64 times the spacing of single-precision numbers at the largest coordinate;
-/// [`MeshError::TooManyVertices`] if more than [`MAX_VERTICES`] would be needed. The mesh is unchanged on error.
+/// [`MeshError::TooManyVertices`] if more than [`MAX_VERTICES`] would be needed; [`MeshError::TooCrowded`]. The mesh is
+/// unchanged on error.
 pub fn remesh(mesh: &mut Mesh, bounds: EdgeBounds) -> Result<Changes, MeshError> {
     finished(remesh_in_slices(mesh, bounds, &Pauses::default()))
 }
@@ -88,6 +89,7 @@ pub async fn remesh_in_slices(
     pauses.now().await;
     let changes = remesh_scaled(mesh, bounds.scaled(shrink), pauses).await;
     pauses.now().await;
+    let changes = changes.inspect_err(|_| mesh.clone_from(&before))?;
     if mesh.vertex_count() >= MAX_VERTICES {
         let vertices = mesh.vertex_count() as u64;
         mesh.clone_from(&before);
@@ -107,7 +109,10 @@ fn is_one_point(mesh: &Mesh) -> bool {
 
 /// Remeshes a mesh that was scaled to edges of about 1: with unchecked edits, then with checked ones where these caused
 /// self-intersections. Returns the changes made.
-async fn remesh_scaled(mesh: &mut Mesh, bounds: EdgeBounds, pauses: &Pauses) -> Changes {
+///
+/// # Errors
+/// [`MeshError::TooCrowded`].
+async fn remesh_scaled(mesh: &mut Mesh, bounds: EdgeBounds, pauses: &Pauses) -> Result<Changes, MeshError> {
     let surface = mesh.clone();
     let target_edge = (bounds.min * bounds.max).sqrt();
     let mut conflicts = ConflictMask::new(&surface);
@@ -116,7 +121,10 @@ async fn remesh_scaled(mesh: &mut Mesh, bounds: EdgeBounds, pauses: &Pauses) -> 
         pauses.now().await;
         let mut changes = rounds(mesh, bounds, &mut session, pauses).await;
         let mut embedding = embedding_of(mesh, bounds.max);
+        embedding.set_limits_pairs(true);
         let intersecting = embedding.intersecting_vertices_in_slices(mesh, pauses).await;
+        embedding.check_pairs(mesh)?;
+        embedding.set_limits_pairs(false);
         let is_separated = intersecting.is_empty() || embedding.separate(mesh, &intersecting, pauses).await;
         let has_left_out = !conflicts.is_empty();
         pauses.now().await;
@@ -127,7 +135,7 @@ async fn remesh_scaled(mesh: &mut Mesh, bounds: EdgeBounds, pauses: &Pauses) -> 
         };
         near.into_iter().for_each(|v| conflicts.add(session.anchor(v), mesh.position(v), target_edge));
         if is_separated && conflicts.is_empty() {
-            return changes;
+            return Ok(changes);
         }
         if is_separated {
             let mut checked = session.with(conflicts.dilated(target_edge), embedding);
@@ -136,19 +144,22 @@ async fn remesh_scaled(mesh: &mut Mesh, bounds: EdgeBounds, pauses: &Pauses) -> 
             } else {
                 last_round(mesh, bounds, &mut checked, pauses).await
             };
-            return changes;
+            return Ok(changes);
         }
         mesh.clone_from(&surface);
         if run == INPUT_TEST_RUN {
             let mut embedding = embedding_of(mesh, mesh.longest_edge());
-            if !embedding.intersecting_vertices_in_slices(mesh, pauses).await.is_empty() {
+            embedding.set_limits_pairs(true);
+            let intersecting = embedding.intersecting_vertices_in_slices(mesh, pauses).await;
+            embedding.check_pairs(mesh)?;
+            if !intersecting.is_empty() {
                 break;
             }
         }
     }
     let embedding = embedding_of(mesh, bounds.max);
     let mut session = Session::new(&surface, target_edge, vec![true; surface.slots()], embedding);
-    rounds(mesh, bounds, &mut session, pauses).await
+    Ok(rounds(mesh, bounds, &mut session, pauses).await)
 }
 
 fn embedding_of(mesh: &Mesh, edge: f32) -> Embedding {
