@@ -4,9 +4,13 @@
 use crate::math::triangle::area_vector;
 use crate::math::{IVec3, Vec3};
 use crate::mesh::{DisjointSets, TriangleMesh};
+use crate::pauses::Pauses;
 
 /// The cosine of the largest angle by which a triangle may turn when vertices are merged, 60°.
 const LARGEST_TURN: f64 = 0.5;
+
+/// The number of triangles that each pass reads in a unit of work.
+const TRIANGLES_PER_UNIT: usize = 64;
 
 /// The smallest number of triangles at a vertex of the simplified surface; with fewer it would not be a closed mesh.
 const MIN_VALENCE: u32 = 3;
@@ -16,13 +20,24 @@ const MIN_VALENCE: u32 = 3;
 /// cluster and are merged at their mean. A cluster is merged only if this neither changes the topology nor turns a
 /// triangle by more than 60°, and if each of its vertices is within `furthest` of the mean, measured along the normal
 /// of the vertex. The result has positions and triangles, but no attributes.
-pub fn clustered(mesh: &TriangleMesh, furthest: f32, cell: impl Fn(Vec3) -> IVec3) -> TriangleMesh {
+pub async fn clustered(
+    mesh: &TriangleMesh,
+    furthest: f32,
+    cell: impl Fn(Vec3) -> IVec3,
+    pauses: &Pauses,
+) -> TriangleMesh {
+    let pass = mesh.triangles.len() / TRIANGLES_PER_UNIT;
     let mut clusters = Clusters::new(mesh, cell);
+    pauses.after(pass).await;
     clusters.keep_contractible(mesh);
+    pauses.after(pass).await;
     clusters.dissolve_bent(mesh, furthest);
     loop {
+        pauses.after(pass).await;
         let merged = clusters.merge(mesh);
+        pauses.after(pass).await;
         if !clusters.dissolve_invalid(mesh, &merged) {
+            pauses.after(pass).await;
             return merged.components_where(|_| true);
         }
     }
@@ -184,6 +199,7 @@ fn doubled_edges(mesh: &TriangleMesh, valences: &[u32]) -> Vec<[u32; 2]> {
 mod tests {
     use super::*;
     use crate::mesh::Mesh;
+    use crate::pauses::finished;
     use crate::volume::{Grid, marching_cubes};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -206,10 +222,14 @@ mod tests {
         mesh
     }
 
+    fn thinned(mesh: &TriangleMesh, furthest: f32, cell: impl Fn(Vec3) -> IVec3) -> TriangleMesh {
+        finished(clustered(mesh, furthest, cell, &Pauses::default()))
+    }
+
     #[test]
     fn a_torus_keeps_its_handle_and_a_quarter_of_its_vertices_go() {
         let torus = contour(|p| 2.5 - Vec3::new(p.truncate().length() - 6.5, p.z, 0.0).length());
-        let merged = clustered(&torus, f32::INFINITY, whole);
+        let merged = thinned(&torus, f32::INFINITY, whole);
         assert_eq!(valid_mesh(&merged).euler(), 0);
         let [before, after] = [&torus, &merged].map(|mesh| mesh.positions.len());
         assert!(4 * after < 3 * before, "{after} of {before}");
@@ -223,7 +243,7 @@ mod tests {
     fn what_bends_within_a_cell_stays() {
         let off_axis = |p: Vec3| Vec3::new(p.y - 0.5, p.z - 0.5, 0.0).length();
         let tube = contour(|p| (1.3 - off_axis(p)).min(8.0 - p.x.abs()));
-        let [near, rough] = [0.03, f32::INFINITY].map(|furthest| clustered(&tube, furthest, whole));
+        let [near, rough] = [0.03, f32::INFINITY].map(|furthest| thinned(&tube, furthest, whole));
         let thinnest = |mesh: &TriangleMesh| {
             let inner = mesh.positions.iter().map(|p| *p - 11.5).filter(|p| p.x.abs() < 7.0);
             inner.map(off_axis).fold(f32::INFINITY, f32::min)
@@ -239,7 +259,7 @@ mod tests {
         for seed in 0..40 {
             let random = std::cell::RefCell::new(crate::math::Random::new(seed));
             let noisy = contour(|p| 8.0 - p.length() + 6.0 * (random.borrow_mut().unit() as f32 - 0.5));
-            let merged = clustered(&noisy, f32::INFINITY, whole);
+            let merged = thinned(&noisy, f32::INFINITY, whole);
             let (before, after) = (valid_mesh(&noisy), valid_mesh(&merged));
             assert_eq!(after.euler(), before.euler(), "seed {seed}");
             assert_eq!(after.component_count(), before.component_count(), "seed {seed}");
@@ -249,9 +269,9 @@ mod tests {
 
     #[test]
     fn nothing_is_left_of_nothing_and_large_cells_leave_closed_surfaces() {
-        assert!(clustered(&TriangleMesh::default(), f32::INFINITY, whole).triangles.is_empty());
+        assert!(thinned(&TriangleMesh::default(), f32::INFINITY, whole).triangles.is_empty());
         let ball = contour(|p| 8.0 - p.length());
-        let merged = clustered(&ball, f32::INFINITY, |p| (p / 8.0).round().as_ivec3());
+        let merged = thinned(&ball, f32::INFINITY, |p| (p / 8.0).round().as_ivec3());
         assert_eq!(valid_mesh(&merged).euler(), 2);
     }
 }

@@ -182,15 +182,19 @@ impl Slices for Negated<'_> {
 /// Simplifies a contour by clustering, which saves more than half of the edits that bring its edges within bounds:
 /// connected vertices in a voxel of the level, or in a cube of side δ if that is larger, are merged where the surface
 /// is flat, see [`FLATNESS`]. Returns the contour unchanged if δ is below [`MIN_SIDE`].
-pub(super) fn simplified(contour: TriangleMesh, image: &LevelImage, delta: f32) -> TriangleMesh {
+pub(super) async fn simplified(
+    contour: TriangleMesh,
+    image: &LevelImage,
+    delta: f32,
+    pauses: &Pauses,
+) -> TriangleMesh {
     let side = delta * image.voxels_per_unit();
     if side < MIN_SIDE {
         return contour;
     }
     let side = if side > 1.0 { side } else { 1.0 };
-    clustered(&contour, FLATNESS / image.voxels_per_unit(), |p| {
-        (image.part_index(p) / side).round().as_ivec3()
-    })
+    let cell = |p| (image.part_index(p) / side).round().as_ivec3();
+    clustered(&contour, FLATNESS / image.voxels_per_unit(), cell, pauses).await
 }
 
 /// Returns a surface with its positions mapped by `position`, for conversions between voxel indices of a level and

@@ -129,7 +129,7 @@ impl DeformableModel {
         self.update_components(components);
         self.initialise_attributes(&added);
         if self.convergence.sized {
-            self.set_sizes_of(&added);
+            finished(self.set_sizes_of(&added, &Pauses::default()));
         }
         let mut active = added.clone();
         self.mesh.add_neighbours(&mut active);

@@ -47,7 +47,8 @@ impl DeformableModel {
             return Ok(Renewal::default());
         }
         pauses.now().await;
-        let added = simplified(added, image, self.pyramid.delta_at(self.finest_delta, level));
+        let delta = self.pyramid.delta_at(self.finest_delta, level);
+        let added = simplified(added, image, delta, pauses).await;
         Ok(Renewal { removed, added: Mesh::from_triangles(&added)? })
     }
 

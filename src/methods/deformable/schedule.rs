@@ -160,7 +160,7 @@ impl DeformableModel {
     /// parts instead. If that changed anything, quiet iterations are counted anew. Edits wake only the vertices around
     /// them. Returns the numbers of edits.
     async fn size_and_seed(&mut self, times: &mut Times, pauses: &Pauses) -> Result<Changes, MethodError> {
-        if self.set_sizes() {
+        if self.set_sizes(pauses).await {
             self.convergence.quiet = 0;
             pauses.now().await;
             return Ok(self.check_everything(times, pauses).await);

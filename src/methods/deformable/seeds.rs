@@ -78,7 +78,7 @@ impl DeformableModel {
         times.add("seeding", (self.clock)() - begin);
         if changes.seeds > 0 {
             if self.convergence.sized {
-                self.set_sizes_of(&added);
+                self.set_sizes_of(&added, pauses).await;
             }
             changes += self.restore_bounds(&added, times, pauses).await;
         }

@@ -11,6 +11,7 @@ use super::DeformableModel;
 use super::contour::{ObjectIs, SMALL_PART};
 use crate::math::Vec3;
 use crate::mesh::VertexId;
+use crate::pauses::Pauses;
 use crate::remesh::Sampling;
 use crate::volume::CellCache;
 
@@ -53,6 +54,9 @@ const STRIDE: f32 = 0.5;
 /// vertices; each reaches one edge further.
 const PASSES: usize = 3;
 
+/// The number of edges or vertices whose sizes are a unit of work.
+const EDGES_PER_UNIT: usize = 16;
+
 /// The mean edge length, in δ, where vertices have size 1.
 const MEAN_EDGE: f32 = super::MEAN_EDGE as f32;
 
@@ -64,20 +68,20 @@ impl DeformableModel {
     /// Sets the size of every vertex, a local factor on δ, by the curvature of the contour, and returns whether it did:
     /// not if sizes were set on this level before, or if the model does not adapt to the image. Seeds added later are
     /// given sizes separately.
-    pub(super) fn set_sizes(&mut self) -> bool {
+    pub(super) async fn set_sizes(&mut self, pauses: &Pauses) -> bool {
         if self.convergence.sized || self.params.adaptivity == 0.0 || self.params.iso_force == 0.0 {
             return false;
         }
         self.convergence.sized = true;
         let all = self.followed_vertices();
-        self.set_sizes_of(&all);
+        self.set_sizes_of(&all, pauses).await;
         true
     }
 
     /// Sets the sizes, local factors on δ, of some vertices by the curvature of the contour, with bounded differences
     /// between neighbours, and scaled by the parameter `adaptivity`, which must not be 0.
-    pub(super) fn set_sizes_of(&mut self, members: &[VertexId]) {
-        let mut sizes = self.sizes_by_curvature(members);
+    pub(super) async fn set_sizes_of(&mut self, members: &[VertexId], pauses: &Pauses) {
+        let mut sizes = self.sizes_by_curvature(members, pauses).await;
         let share = self.params.adaptivity as f32;
         // Other vertices keep their sizes, and bound those of their neighbours.
         let of = self.mesh.scalar(self.keys.size);
@@ -89,21 +93,23 @@ impl DeformableModel {
         }
         for _ in 0..PASSES {
             self.bound_gradation(self.edges_at(members, &is_member), &mut sizes);
+            pauses.after(members.len() / EDGES_PER_UNIT).await;
         }
         let size = self.mesh.scalar_mut(self.keys.size);
         members.iter().map(|v| v.index()).for_each(|v| size[v] = share * (sizes[v] - 1.0));
-        self.set_sizes_of_small_parts(members);
+        self.set_sizes_of_small_parts(members, pauses).await;
     }
 
     /// Sets the sizes, local factors on δ, of those of some vertices that are on parts of a few voxels, by the volume of
     /// the part, if parts so small count; with other sizes they would have too few vertices to be closed.
-    pub(super) fn set_sizes_of_small_parts(&mut self, members: &[VertexId]) {
+    pub(super) async fn set_sizes_of_small_parts(&mut self, members: &[VertexId], pauses: &Pauses) {
         if self.params.smallest_part > SMALL_PART || !self.params.adapts_to_image() {
             return;
         }
         let mut is_seen = vec![false; self.mesh.slots()];
         for &v in members {
             let part = self.mesh.unseen_component_of(v, &mut is_seen);
+            pauses.after(part.len().div_ceil(EDGES_PER_UNIT)).await;
             if part.is_empty() || part.len() > MOST_IN_SMALL_PART {
                 continue;
             }
@@ -134,17 +140,19 @@ impl DeformableModel {
     /// Returns for each vertex in `members`, by slot, the smallest of the sizes, local factors on δ, that the curvature
     /// of the contour gives its edges. At thin walls and gaps, sizes above 1 are bounded by the thickness, but not
     /// below 1.
-    fn sizes_by_curvature(&self, members: &[VertexId]) -> Vec<f32> {
+    async fn sizes_by_curvature(&self, members: &[VertexId], pauses: &Pauses) -> Vec<f32> {
         let mut sizes = vec![LARGEST; self.mesh.slots()];
         let is_member = self.marked(members);
-        let offsets = self.offsets_from_contour(self.edges_at(members, &is_member));
-        for (u, v) in self.edges_at(members, &is_member) {
+        let offsets = self.offsets_from_contour(self.edges_at(members, &is_member), pauses).await;
+        for (k, (u, v)) in self.edges_at(members, &is_member).enumerate() {
+            pauses.after(usize::from(k % EDGES_PER_UNIT == 0)).await;
             let size = self.size_of_edge([u, v], [u, v].map(|w| offsets[w.index()]));
             for w in [u, v].map(|w| w.index()) {
                 sizes[w] = if size < sizes[w] { size } else { sizes[w] };
             }
         }
-        for &v in members {
+        for (k, &v) in members.iter().enumerate() {
+            pauses.after(usize::from(k % EDGES_PER_UNIT == 0)).await;
             let size = &mut sizes[v.index()];
             if *size > 1.0 {
                 *size = size.min(self.size_by_thickness(v).max(1.0));
@@ -210,9 +218,14 @@ impl DeformableModel {
 
     /// Returns the offset of each end of `edges` from the contour along its normal, by slot, in voxels of the finest
     /// level; positive inside the contour.
-    fn offsets_from_contour(&self, edges: impl Iterator<Item = (VertexId, VertexId)>) -> Vec<f32> {
+    async fn offsets_from_contour(
+        &self,
+        edges: impl Iterator<Item = (VertexId, VertexId)>,
+        pauses: &Pauses,
+    ) -> Vec<f32> {
         let mut offsets = vec![f32::NAN; self.mesh.slots()];
-        for v in edges.flat_map(|(u, v)| [u, v]) {
+        for (k, v) in edges.flat_map(|(u, v)| [u, v]).enumerate() {
+            pauses.after(usize::from(k % EDGES_PER_UNIT == 0)).await;
             if !offsets[v.index()].is_nan() {
                 continue;
             }
@@ -257,6 +270,7 @@ mod tests {
     use super::*;
 
     use crate::methods::deformable::{DeformableOptions, DeformableParams};
+    use crate::pauses::finished;
     use crate::volume::{Volume, VolumeInit, Voxels};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -280,7 +294,7 @@ mod tests {
         let mut model = model();
         let mean = |model: &DeformableModel| {
             let all: Vec<VertexId> = model.mesh.vertices().collect();
-            let sizes = model.sizes_by_curvature(&all);
+            let sizes = finished(model.sizes_by_curvature(&all, &Pauses::default()));
             model.mesh.vertices().map(|v| sizes[v.index()]).sum::<f32>() / model.mesh.vertex_count() as f32
         };
         let on_contour = mean(&model);

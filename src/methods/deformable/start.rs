@@ -205,10 +205,10 @@ impl DeformableModel {
 
     async fn resolve_sized(&mut self, pauses: &Pauses) -> Result<(), MethodError> {
         let all: Vec<_> = self.mesh.vertices().collect();
-        self.set_sizes_of_small_parts(&all);
+        self.set_sizes_of_small_parts(&all, pauses).await;
         self.resolve_everywhere(pauses).await?;
         // A contour of the finest level is close to the result. Other starts are sized once they have settled.
-        if self.level == 0 && self.set_sizes() {
+        if self.level == 0 && self.set_sizes(pauses).await {
             self.resolve_everywhere(pauses).await?;
         }
         self.reorder();
@@ -412,7 +412,7 @@ pub(super) async fn contour_mesh(
     if surface.triangles.is_empty() {
         return Ok(context.may_be_empty.then(Mesh::default));
     }
-    let surface = simplified(surface, context.image, context.sampling.shortest());
+    let surface = simplified(surface, context.image, context.sampling.shortest(), pauses).await;
     pauses.now().await;
     Ok(Some(Mesh::from_triangles(&surface)?))
 }
