@@ -16,10 +16,10 @@ const MANY: usize = 8;
 /// The number of pairs of vertices whose tests are a unit of work.
 const TESTS_PER_UNIT: usize = 256;
 
-/// The largest number of pairs of near vertices that a sweep stores, for each vertex and at least; each takes 16 bytes or
-/// more. Usual meshes have less than 20 a vertex; those with edges of very different lengths, or that intersect themselves
-/// everywhere, have thousands.
-const MOST_PAIRS: [usize; 2] = [32, 1 << 24];
+/// The largest number of pairs of near vertices that a sweep stores, for each vertex and at least; each takes about 40
+/// bytes. Usual meshes have two or three a vertex; those with edges of very different lengths, or that intersect themselves
+/// everywhere, have hundreds.
+const MOST_PAIRS: [usize; 2] = [16, 1 << 23];
 
 fn most_pairs(mesh: &Mesh) -> usize {
     MOST_PAIRS[1].max(MOST_PAIRS[0].saturating_mul(mesh.vertex_count()))
