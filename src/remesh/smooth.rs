@@ -424,6 +424,28 @@ mod tests {
         assert!(held_volumes > 60, "{held_volumes}");
     }
 
+    /// Regression: a mesh of a hundred spheres in one place took gigabytes.
+    #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+    #[test]
+    fn meshes_in_one_place_are_refused_unchanged() {
+        let ball = Mesh::icosahedron(Vec3::ZERO, 1.0);
+        let mut mesh = ball.clone();
+        while mesh.vertex_count() < 9000 {
+            let mut other = ball.clone();
+            let turn = mesh.vertex_count() as f32 * 1e-4;
+            let (sin, cos) = (libm::sinf(turn), libm::cosf(turn));
+            for p in other.positions_mut() {
+                *p = Vec3::new(p.x * cos - p.y * sin, p.x * sin + p.y * cos, p.z);
+            }
+            mesh.append(&other).unwrap();
+        }
+        let before = mesh.positions().to_vec();
+        let error = smooth(&mut mesh, Smoothing { iterations: 1, keeps_volume: false }).unwrap_err();
+        assert!(matches!(error, MeshError::TooCrowded { .. }), "{error}");
+        let moved = mesh.positions().iter().zip(&before).map(|(p, q)| p.distance(*q)).fold(0.0, f32::max);
+        assert!(moved < 1e-6, "{moved}");
+    }
+
     /// Returns the mesh smoothed without a guard, and the vertices that are held back on the way there; `None` if they are too
     /// many.
     fn unguarded(mesh: &Mesh, smoothing: Smoothing) -> (Mesh, Option<Vec<VertexId>>) {

@@ -67,6 +67,11 @@ impl Embedding {
     async fn check(&mut self, mesh: &Mesh, anew: bool, pauses: &Pauses) -> Vec<VertexId> {
         let dirty = std::mem::take(&mut self.dirty);
         self.update_pairs(mesh, &dirty, pauses).await;
+        if self.is_crowded {
+            // Whatever is found is void.
+            dirty.iter().for_each(|v| self.pending[v.index()] = Checks::default());
+            return Vec::new();
+        }
         for (&v, check) in dirty.iter().flat_map(|v| PAIRS.map(|check| (v, check))) {
             if self.pending[v.index()].has(check) {
                 self.motion_bounds[v.index()].set(check, f32::INFINITY);
@@ -114,7 +119,7 @@ impl Embedding {
         let parts = |count: usize| (0..count).step_by(step).map(move |first| first..count.min(first + step));
         if self.pending[v.index()].has(Check::OneRing) {
             if self.lacks_clearance_around(mesh, v) {
-                pauses.after(work(0..valence)).await;
+                pauses.after(valence).await;
                 for part in parts(valence) {
                     intersections_around(mesh, v, part.clone(), self.output.as_ref(), intersecting);
                     keep_few(intersecting, mesh);
@@ -333,6 +338,8 @@ mod tests {
     use crate::core_tests::common::{assert_at_least, seeds};
     use crate::math::{Random, Vec3};
     use crate::mesh::{TriangleMesh, intersecting_pairs, shapes};
+    use crate::pauses::advance;
+    use std::task::Poll;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -390,6 +397,41 @@ mod tests {
         intersecting.sort_unstable();
         intersecting.dedup();
         intersecting
+    }
+
+    /// Returns a double cone around a star polygon of `n` corners, each side of which crosses most others.
+    fn star(n: usize) -> Mesh {
+        let corner = |j: usize| {
+            let angle = (j * (n / 2 - 1)) as f64 / n as f64 * std::f64::consts::TAU;
+            Vec3::new(libm::cos(angle) as f32, libm::sin(angle) as f32, (j % 7) as f32 * 0.01)
+        };
+        let positions = (0..n).map(corner).chain([Vec3::Z, -Vec3::Z]).collect();
+        let [top, bottom] = [n as u32, n as u32 + 1];
+        let sides = (0..n as u32).map(|j| (j, (j + 1) % n as u32));
+        let triangles = sides.flat_map(|(j, k)| [[j, k, top], [k, j, bottom]]).collect();
+        Mesh::from_triangles(&TriangleMesh { positions, triangles, ..TriangleMesh::default() }).unwrap()
+    }
+
+    /// Regression: thousands of triangles at a vertex were tested at once, and each intersection was stored.
+    #[test]
+    fn wide_rings_are_tested_in_parts_with_the_same_result() {
+        let mesh = star(3 * WIDE);
+        let mut embedding = Embedding::default();
+        embedding.sync_with_edge(&mesh, 1.0);
+        let pauses = Pauses::default();
+        let mut check = Box::pin(embedding.check_all_in_slices(&mesh, &pauses));
+        let (mut slices, mut longest, mut before) = (0, 0, 0);
+        let found = loop {
+            let state = advance(&mut check);
+            longest = longest.max(pauses.work() - before);
+            (slices, before) = (slices + 1, pauses.work());
+            if let Poll::Ready(found) = state {
+                break found;
+            }
+        };
+        assert_eq!(found, expected(&mesh));
+        // A unit takes some microseconds, and a slice has 500.
+        assert!(slices > 20 && longest < 3000, "{slices} slices of up to {longest}");
     }
 
     #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
