@@ -107,7 +107,7 @@ fn inflate(
     let (mut consumed, mut written) = (0, 0);
     let most = limit.saturating_add(1);
     let mut capacity = INITIAL_CAPACITY;
-    // What it may become is reserved, as moving a doubled buffer needs room for both. Without it, doubling may do.
+    // The most that it may become is reserved, as moving a doubled buffer needs room for both. If that fails, doubling may do.
     let reserved = most.saturating_sub(start).min(input.len().saturating_mul(MOST_INFLATED));
     let _ = out.try_reserve_exact(reserved);
     loop {

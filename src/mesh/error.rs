@@ -52,7 +52,7 @@ pub enum MeshError {
         /// The number of vertices that would be needed, estimated where it is not known in advance.
         vertices: u64,
     },
-    /// So many vertices are near each other that there is not enough memory to test their triangles for intersections.
+    /// More vertices are near each other than there is memory to test their triangles for intersections.
     #[error(
         "too many vertices of the mesh are near each other (over {pairs} pairs): it intersects itself in many places, or its edges \
          differ too much in length"
