@@ -1,5 +1,6 @@
 import type { Finish } from '../finish';
 import { anyForeign, noted } from '../importers';
+import { isLesson } from '../lessons/recognise';
 import type { Session, SourceFile } from '../session/file';
 import { isSession } from '../session/recognise';
 import { text } from '../texts';
@@ -53,6 +54,7 @@ export class Sessions {
     const { states, opening } = this.#lab;
     if (!(await this.#lab.mayReplace())) return;
     try {
+      if (await isLesson(files)) throw new Error(text('lessons.elsewhere'));
       const isOne = file && files.length === 1 && (await isSession(file));
       // Another session takes the place of the one that waits for its data, even if it is damaged.
       if (isOne) this.#waiting = undefined;
