@@ -208,7 +208,7 @@ describe('lessons of the user', () => {
 
   test('with many formulas are typeset in parts, between which the page answers', async () => {
     const formula = `$${'\\sqrt2'.repeat(160)}$`;
-    const bytes = Buffer.from(`# Mine\n\n## Only step\n\n${Array.from({ length: 20 }, () => formula).join(' ')}\n`);
+    const bytes = Buffer.from(`# Mine\n\n## Only step\n\n${Array.from({ length: 15 }, () => formula).join(' ')}\n`);
     const [lesson = files()[0]] = files({ steps: [{ id: 'a' }] });
     await app.page.evaluate(() => {
       const counts: number[] = [];
@@ -220,7 +220,7 @@ describe('lessons of the user', () => {
       Object.assign(window, { counts });
     });
     await dropOnPanel([lesson as { name: string; bytes: Buffer }, { name: 'text.en.md', bytes }]);
-    await expect.poll(() => step().locator('.katex').count()).toBe(20);
+    await expect.poll(() => step().locator('.katex').count()).toBe(15);
     const counts = await app.page.evaluate(() => (window as unknown as { counts: number[] }).counts);
     const parts = counts.map((count, k) => count - (counts[k - 1] ?? 0));
     expect(Math.max(...parts)).toBeLessThan(5);

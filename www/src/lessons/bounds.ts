@@ -10,7 +10,7 @@ const MOST_NESTED = 40;
 /** Most formulas of a text, characters of one, and of all together. */
 const MOST_FORMULAS = 600;
 const MOST_OF_FORMULA = 1_000;
-const MOST_OF_FORMULAS = 20_000;
+const MOST_OF_FORMULAS = 15_000;
 /** How deep a formula may be nested, as braces, delimiters and environments: 40 of 140 roots within each other take seconds. */
 const MOST_NESTED_IN_FORMULA = 20;
 /** Signs that nest a formula; comments and quotations may contain the same, and are matched as a whole. */

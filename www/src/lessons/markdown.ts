@@ -18,10 +18,10 @@ markdown.renderer.rules.link_open = (tokens, index, options, _, renderer) => {
 };
 
 /**
- * Elements of formulas that are typeset in a frame: the browser needs .2 s to lay them out where boxes are nested, and what
+ * Elements of formulas that are typeset in a frame: the browser needs .1 s to lay them out where boxes are nested, and what
  * most lessons have in all is less.
  */
-const MOST_IN_FRAME = 4_000;
+const MOST_IN_FRAME = 2_000;
 
 /** Formulas that are still to be typeset, in this order. */
 let waiting: HTMLElement[] = [];
