@@ -1,4 +1,5 @@
 // Reads the metadata of an OME-Zarr image: its axes, and the transform of each level to world space.
+import { shortened } from '../short-text.js';
 import type { Warning } from '../warning.js';
 import { badZarr, shown } from './error.js';
 
@@ -89,10 +90,11 @@ function list(value: unknown, part: string): Json[] {
 function parseAxes(value: unknown): { names: AxisName[]; units: unknown[] } {
   const axes = list(value, 'multiscales[0].axes');
   const names = axes.map((axis, index) => axisName(axis, `multiscales[0].axes[${index}]`));
-  if (new Set(names).size < names.length) throw badZarr('multiscales[0].axes', `repeated, got ${names.join(', ')}`);
+  const got = `got ${shortened(names.join(', '))}`;
+  if (new Set(names).size < names.length) throw badZarr('multiscales[0].axes', `repeated, ${got}`);
   for (const needed of ['x', 'y'] as const) {
     if (!names.includes(needed)) {
-      throw badZarr('multiscales[0].axes', `must include x and y, and may include z, c and t, got ${names.join(', ')}`);
+      throw badZarr('multiscales[0].axes', `must include x and y, and may include z, c and t, ${got}`);
     }
   }
   return { names, units: axes.map(({ unit }) => unit) };

@@ -9,6 +9,7 @@ import { beforeAll, expect, test } from 'vitest';
 import { apply, callOf, toCode } from '../../www/src/finish/code';
 import { distancesBetween, gridAround, summary } from '../../www/src/finish/distances';
 import type { Edit } from '../../www/src/finish/protocol';
+import { checkSize } from '../../www/src/finish/size';
 import { uniform } from '../../www/src/random';
 
 beforeAll(async () => {
@@ -131,4 +132,16 @@ test('a program has nothing of an edit but its arguments, however they are writt
   expect(
     new Function(`return ((mesh) => mesh.${callOf(odd)})`)()({ keepComponents: (given: unknown) => given }),
   ).toEqual(odd.op === 'keepComponents' ? odd.indices : []);
+});
+
+test('a remeshed surface has about as many vertices as were estimated', () => {
+  for (const max of [0.3, 0.9, 2]) {
+    const mesh = Mesh.parse(noisyBall());
+    const edit: Edit = { op: 'remesh', min: max / 2.25, max };
+    apply(mesh, { op: 'keepComponents', indices: [0] });
+    const before = mesh.clone();
+    apply(mesh, edit);
+    expect(() => checkSize(before, edit, 2 * mesh.vertexCount)).not.toThrow();
+    expect(() => checkSize(before, edit, 0.5 * mesh.vertexCount)).toThrow(/^remesh.* would give about [\d,]+ vertices/);
+  }
 });

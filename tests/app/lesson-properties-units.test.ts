@@ -96,6 +96,20 @@ test('what would keep the page busy is refused', () => {
   expect(() => whole(`# T\n\n## S\n${'$x$ '.repeat(15_000)}`)).toThrow('at most 600 formulas');
   const matrices = `$\\begin{matrix}${'&'.repeat(960)}\\end{matrix}$ `.repeat(5);
   expect(() => whole(`# T\n\n## S\n${matrices}`)).toThrow('at most 500 cells in all formulas');
+  const deep = (depth: number) => whole(`# T\n\n## S\n$${'\\sqrt{'.repeat(depth)}x${'}'.repeat(depth)}$`);
+  expect(deep(20).steps).toHaveLength(1);
+  expect(() => deep(21)).toThrow('at most 20 braces within each other in a formula');
+  // Neither escaped braces nor those in comments and quotations close any.
+  for (const [open, close] of [
+    ['{\\}', '}'],
+    ['{%}\n', '}'],
+    ['{\\verb|}|', '}'],
+    ['\\left(', '\\right)'],
+    ['\\begingroup ', '\\endgroup '],
+  ] as const)
+    expect(() => whole(`# T\n\n## S\n$$${open.repeat(21)}x${close.repeat(21)}$$`)).toThrow('within each other in a');
+  // Dollar signs in code delimit no formula, so what is between two of them may be one.
+  expect(() => whole(`# T\n\n## S\n${`\`$\` $${'x'.repeat(980)}$ `.repeat(40)}`)).toThrow('characters in all formulas');
   expect(whole('# T\n\n## S\n$$\\begin{pmatrix} a & b \\\\ c & d \\end{pmatrix}$$').steps).toHaveLength(1);
   const row = `${'|a'.repeat(20)}|\n`;
   const table = `# T\n\n## S\n${row}${'|-'.repeat(20)}|\n${row.repeat(2_000)}`;

@@ -206,6 +206,37 @@ describe('lessons of the user', () => {
     expect(await panel().locator('.field-error').textContent()).toBe('');
   });
 
+  test('with many formulas are typeset in parts, between which the page answers', async () => {
+    const formula = `$${'\\sqrt2'.repeat(160)}$`;
+    const bytes = Buffer.from(`# Mine\n\n## Only step\n\n${Array.from({ length: 15 }, () => formula).join(' ')}\n`);
+    const [lesson = files()[0]] = files({ steps: [{ id: 'a' }] });
+    await app.page.evaluate(() => {
+      const counts: number[] = [];
+      const count = () => {
+        counts.push(document.querySelectorAll('#lesson .katex').length);
+        requestAnimationFrame(count);
+      };
+      count();
+      Object.assign(window, { counts });
+    });
+    await dropOnPanel([lesson as { name: string; bytes: Buffer }, { name: 'text.en.md', bytes }]);
+    await expect.poll(() => step().locator('.katex').count()).toBe(15);
+    const counts = await app.page.evaluate(() => (window as unknown as { counts: number[] }).counts);
+    const parts = counts.map((count, k) => count - (counts[k - 1] ?? 0));
+    expect(Math.max(...parts)).toBeLessThan(5);
+  });
+
+  test('that are dropped elsewhere are not read as data: the message says where they belong', async () => {
+    const entries = files().map(({ name, bytes }) => [`folder/${name}`, new Uint8Array(bytes)]);
+    const zip = { name: 'mine.zip', bytes: Buffer.from(zipSync(Object.fromEntries(entries))) };
+    for (const list of [[zip], files()]) {
+      await drop(app.page, list);
+      await expect.poll(() => app.page.textContent('.banner')).toContain('This is a lesson.');
+      await app.page.locator('.banner').getByRole('button', { name: 'Dismiss' }).click();
+      expect(await app.page.getAttribute('#lab', 'data-state')).toBe('done');
+    }
+  });
+
   test('at an address that has none, the list says so', LONG, async () => {
     await goTo('?lesson=lessons/none/#extract?example=linked-rings&v=2');
     await expect.poll(() => panel().locator('.field-error').textContent()).toContain('404');

@@ -293,6 +293,19 @@ describe('fill', () => {
   });
 });
 
+test('a volume that looks like a label map is one, too, but a mask may be an image', async () => {
+  await init();
+  const opened = async (value: (share: number, index: number) => number) => {
+    const data = Uint8Array.from({ length: 16 ** 3 }, (_, i) => value(i / 16 ** 3, i));
+    const bytes = new Volume({ data, dims: [16, 16, 16] }).toNifti();
+    const { map, looksLike } = await openImage({ files: [{ name: 'a.nii', bytes }] } as never);
+    return [looksLike, Math.max(...map.voxels)];
+  };
+  expect(await opened((share) => 4 * share)).toEqual([3, 3]);
+  expect(await opened((share) => 2 * share)).toEqual([1, 0]);
+  expect(await opened((_, index) => index % 7)).toEqual([0, 0]);
+});
+
 test('a label map of more labels than the list can show is refused', async () => {
   await init();
   const side = 17;

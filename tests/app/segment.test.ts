@@ -445,6 +445,16 @@ describe('files', () => {
     expect((await of(3)).volume).toBeCloseTo(2 * count([...boxes()], 3));
   });
 
+  test('a volume that looks like a label map says so', async () => {
+    for (const [name, bytes, note] of [
+      ['boxes.nii', ballFile(boxes()), 'looks like a label map with 2 labels, and was opened as one'],
+      ['mask.nii', ballFile(boxes().map((label) => Math.min(label, 1))), 'looks like a mask'],
+    ] as const) {
+      await opened(() => drop(app.page, [{ name, bytes }]));
+      expect(await text('.facts')).toContain(note);
+    }
+  });
+
   for (const [format, options] of [
     ['nifti', LONG],
     ['nrrd', {}],

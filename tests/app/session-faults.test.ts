@@ -102,6 +102,43 @@ test.each(LABS)('%s: its own session opens, and with a camera nowhere it is refu
   await reach(page, 'paused', 'done');
 });
 
+test('a small session whose edit would make a large mesh opens without it, and says so', async () => {
+  const { page } = app;
+  await open(app, QUICK.extract);
+  await reach(page, 'done');
+  const smooth = { op: 'smooth', iterations: 1, keepVolume: true };
+  const remesh = { op: 'remesh', min: 0.1, max: 0.21 };
+  await dropSession(
+    page,
+    withIndex(tooth, (index) => {
+      index.edits = [smooth, remesh];
+    }),
+  );
+  await banner(page).toMatch(/remesh\(\{ min: 0\.1, max: 0\.21 \}\) would give about [\d,]+ vertices, .* 500,000\.$/);
+  expect(await facts(page)).toContain('tooth.nrrd');
+  expect(await page.textContent('.finish [role=alert]')).toMatch(
+    /^The session is open; edits of its surface made again: 1 of 2/,
+  );
+  expect(await page.locator('.edit-log li').count()).toBe(1);
+});
+
+test('a session whose edits are cancelled is open without them, and says so', async () => {
+  const { page } = app;
+  await open(app, QUICK.extract);
+  await reach(page, 'done');
+  const smooth = { op: 'smooth', iterations: 1_000_000, keepVolume: true };
+  await dropSession(
+    page,
+    withIndex(tooth, (index) => {
+      index.edits = [smooth];
+    }),
+  );
+  await expect.poll(() => facts(page)).toContain('tooth.nrrd');
+  await page.click('[data-finish=cancel]:enabled');
+  const status = () => page.textContent('[data-finish=status]');
+  await expect.poll(status).toBe('Cancelled. The session is open; edits of its surface made again: 0 of 1.');
+});
+
 test('a session is read in a worker, which refuses it in the language of the page', async () => {
   const page = await anotherPage(app, () => {
     const { parse } = JSON;

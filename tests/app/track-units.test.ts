@@ -308,6 +308,13 @@ describe('images', () => {
     film.free();
   });
 
+  test('of a single frame are refused before anything is computed', async () => {
+    const still = new Volume({ data: new Uint8Array(64), dims: [4, 4, 4] });
+    const files = [{ name: 'still.nii', bytes: still.toNifti() }];
+    still.free();
+    await expect(openImage({ files })).rejects.toThrow('through at least two frames, and this image has one.');
+  });
+
   test('are binned and enriched with slices as requested', async () => {
     const film = Volume.parse(new Uint8Array(await readFile(at('www/public/data/heart.nii.gz'))));
     expect([...film.dims, film.frames]).toEqual([64, 64, 20, 20]);

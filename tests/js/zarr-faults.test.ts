@@ -199,6 +199,12 @@ describe('metadata that lies', () => {
     ['no axes', 'axes', undefined, /axes: must be a list/],
     ['axes as text', 'axes', ['z', 'y', 'x'], /axes: must be a list/],
     ['axis twice', 'axes.0.name', 'x', /axes: repeated, got x, y, x/],
+    [
+      'many axes',
+      'axes',
+      Array.from({ length: 140_000 }, () => ({ name: 'x', type: 'space' })),
+      /axes: repeated, got [x, ]{199}…$/,
+    ],
     ['no x', 'axes.2', { name: 't', type: 'time' }, /must include x and y/],
     ['unknown axis', 'axes.0.name', 'depth', /axes\[0\]: must be x, y or z .*got "depth"/],
     ['type', 'axes.0.type', 'time', /axes\[0\]: .*got "z" of type "time"/],

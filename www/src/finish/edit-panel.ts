@@ -128,7 +128,7 @@ export class EditPanel {
   async #open(): Promise<void> {
     if (!this.#enabled || !this.#unfolded || this.#working > 0 || this.#finishing.edited) return;
     // Controls stay enabled meanwhile: a button that is disabled while it is pressed loses the click.
-    await this.attempt(() => this.#finishing.open(), false);
+    await this.attempt(() => this.#finishing.open(), { blocking: false });
   }
 
   #operations(): HTMLElement[] {
@@ -231,7 +231,8 @@ export class EditPanel {
   async #change(kind: 'edit' | 'undo' | 'redo', make: () => Edit | undefined = () => undefined): Promise<void> {
     await this.attempt(async () => {
       await this.#finishing.open();
-      await this.#finishing.change(kind, make() as never);
+      const edit = make();
+      await this.#finishing.change(kind, (edit && { edit }) as never);
       const { info } = this.#finishing.edited?.measures ?? {};
       if (info)
         this.#status.textContent = text('finish.done', { triangles: plural('counts.triangle', info.triangles) });
@@ -239,10 +240,13 @@ export class EditPanel {
   }
 
   /**
-   * Does some work; controls are disabled meanwhile if it is `blocking`. An error is shown, and nothing else changes.
-   * Returns whether the work was done.
+   * Does some work; controls are disabled meanwhile if it is `blocking`. An error is shown, with what `state` says of the
+   * surface then: by default, nothing has changed. Returns whether the work was done.
    */
-  async attempt(work: () => Promise<unknown>, blocking = true): Promise<boolean> {
+  async attempt(
+    work: () => Promise<unknown>,
+    { blocking = true, state = () => text('finish.unchanged') } = {},
+  ): Promise<boolean> {
     this.#error.textContent = '';
     this.#status.textContent = text('finish.working');
     const focused = document.activeElement;
@@ -253,8 +257,8 @@ export class EditPanel {
       return true;
     } catch (error) {
       const reason = error instanceof Error ? error.message : String(error);
-      this.#status.textContent = isCancelled(error) ? text('finish.cancelled') : '';
-      this.#error.textContent = isCancelled(error) ? '' : text('finish.refused', { reason });
+      this.#status.textContent = isCancelled(error) ? text('finish.cancelled', { state: state() }) : '';
+      this.#error.textContent = isCancelled(error) ? '' : text('finish.refused', { state: state(), reason });
       return false;
     } finally {
       this.#count(-1, blocking);

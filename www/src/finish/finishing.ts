@@ -93,7 +93,7 @@ export class Finishing {
     const { log = [], undone = [] } = this.#edited ?? {};
     await Promise.all([
       client.request('open', this.initial),
-      ...[...log, ...undone].map((edit) => client.request('edit', edit)),
+      ...[...log, ...undone].map((edit) => client.request('edit', { edit })),
       ...undone.map(() => client.request('undo', undefined)),
     ]);
   }

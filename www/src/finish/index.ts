@@ -10,6 +10,7 @@ import { EditPanel } from './edit-panel';
 import type { EditedView } from './edited-view';
 import { Finishing, isCancelled } from './finishing';
 import type { Edit, Edited } from './protocol';
+import { MOST_OF_SMALL } from './size';
 
 /** Parts of a lab that the tools use. */
 export interface FinishHost {
@@ -91,17 +92,26 @@ export class Finish {
     return this.#finishing.edited?.undone ?? [];
   }
 
-  /** Makes edits of a session again, also those that were undone there, which can be redone then. */
-  async repeat(edits: Edit[], undone: Edit[]): Promise<void> {
-    if (edits.length + undone.length === 0) return;
+  /**
+   * Makes edits of a session again, also those that were undone there, which can be redone then. Those of a small file may
+   * not give a large surface.
+   */
+  async repeat(edits: Edit[], undone: Edit[], isSmall = false): Promise<void> {
+    const all = [...edits, ...undone];
+    if (all.length === 0) return;
     // Shown, with *Cancel*: edits may take long.
     this.#section.open = true;
+    let done = 0;
     const make = async () => {
-      for (const edit of [...edits, ...undone]) await this.#finishing.change('edit', edit);
+      for (const edit of all) {
+        await this.#finishing.change('edit', { edit, ...(isSmall && { most: MOST_OF_SMALL }) });
+        done += 1;
+      }
       for (const _ of undone) await this.#finishing.change('undo', undefined);
     };
     const made = make();
-    if (await this.#edits.attempt(() => made)) return;
+    const state = () => text('finish.repeated', { made: done, count: all.length });
+    if (await this.#edits.attempt(() => made, { state })) return;
     await made.catch((error) => {
       if (!isCancelled(error)) throw error;
     });

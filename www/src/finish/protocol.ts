@@ -63,7 +63,8 @@ export interface Comparison {
 export interface Requests {
   /** Takes over a surface as the bytes of a mesh file; edits of the one before are forgotten. */
   open: { body: Uint8Array; reply: Edited };
-  edit: { body: Edit; reply: Edited };
+  /** Makes an edit, unless it would give more than about `most` vertices. */
+  edit: { body: { edit: Edit; most?: number }; reply: Edited };
   undo: { body: undefined; reply: Edited };
   redo: { body: undefined; reply: Edited };
   export: { body: ExportRequest; reply: Uint8Array };

@@ -11,6 +11,7 @@ import { readFiles } from '../worker/volumes';
 import { apply } from './code';
 import { distancesBetween, gridAround } from './distances';
 import type { Comparison, Edit, Edited, RequestKind, Requests, SurfacePoint } from './protocol';
+import { checkSize } from './size';
 
 /** Number of triangles in all surfaces that are kept for undo. */
 const KEPT_TRIANGLES = 5_000_000;
@@ -52,8 +53,9 @@ function open(bytes: Uint8Array): Edited {
   return edited();
 }
 
-function edit(change: Edit): Edited {
+function edit({ edit: change, most }: Requests['edit']['body']): Edited {
   const { mesh, log } = current();
+  if (most !== undefined) checkSize(mesh, change, most);
   const changed = mesh.clone();
   try {
     apply(changed, change);

@@ -1,7 +1,7 @@
 import { SEGMENT_EXAMPLES, type SegmentExample } from '../segment/examples';
 import type { OpenedImage } from '../segment/protocol';
 import { text } from '../texts';
-import { lengths, milliseconds } from '../ui/format';
+import { count, lengths, milliseconds } from '../ui/format';
 import { ExamplePanel, type Fact } from './example-panel';
 import { unitOf } from './surface-space';
 
@@ -30,7 +30,7 @@ export function segmentData(
 
 /** Returns the facts about an open volume and its label map. */
 export function factsOf(
-  { volume, labelFile, milliseconds: duration }: OpenedImage,
+  { volume, labelFile, looksLike, milliseconds: duration }: OpenedImage,
   example: SegmentExample | undefined,
 ): Fact[] {
   const sizes = volume.spacing.map((x) => Number(x.toPrecision(3)));
@@ -40,6 +40,12 @@ export function factsOf(
     [text('extract.factVoxels'), volume.dims.join(' × ')],
     [text('labs.factVoxelSize'), lengths(sizes, example?.unit ?? unitOf(volume))],
     [text('segment.factSurfaces'), milliseconds(duration)],
+    ...(looksLike > 0 && !example ? [likenessOf(looksLike)] : []),
     ...(volume.remarks ?? []).map((remark): Fact => [text('labs.factNote'), remark]),
   ];
 }
+
+const likenessOf = (labels: number): Fact => [
+  text('labs.factNote'),
+  labels > 1 ? text('segment.openedAsMap', { labels: count(labels) }) : text('segment.looksLikeMask'),
+];

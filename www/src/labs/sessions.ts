@@ -1,7 +1,8 @@
 import type { Finish } from '../finish';
 import { anyForeign, noted } from '../importers';
+import { isLesson } from '../lessons/recognise';
 import type { Session, SourceFile } from '../session/file';
-import { isSession } from '../session/recognise';
+import { isSession, SMALL } from '../session/recognise';
 import { text } from '../texts';
 import { readFiles } from '../ui/files';
 import type { ErrorBanner, StatusLine } from '../ui/status';
@@ -53,6 +54,7 @@ export class Sessions {
     const { states, opening } = this.#lab;
     if (!(await this.#lab.mayReplace())) return;
     try {
+      if (await isLesson(files)) throw new Error(text('lessons.elsewhere'));
       const isOne = file && files.length === 1 && (await isSession(file));
       // Another session takes the place of the one that waits for its data, even if it is damaged.
       if (isOne) this.#waiting = undefined;
@@ -115,7 +117,8 @@ export class Sessions {
 
   async #read(file: File): Promise<void> {
     const { readApart } = await import('../session/apart');
-    const session = await readApart(new Uint8Array(await file.arrayBuffer()));
+    const read = await readApart(new Uint8Array(await file.arrayBuffer()));
+    const session: Session = { ...read, isSmall: file.size <= SMALL };
     if (session.lab === this.#lab.id) await this.#open(session);
     else this.#lab.passOn({ lab: session.lab, session, name: '', bytes: new Uint8Array(), params: {} });
   }
@@ -140,7 +143,8 @@ export class Sessions {
     const { edits, undone, warnings } = session.content;
     if (opening.source?.session !== session) return;
     ui.warnings.restore(warnings);
-    await ui.finish?.repeat(edits, undone).catch((error) => states.fail(text('sessions.editsFailed'), error));
+    const repeated = ui.finish?.repeat(edits, undone, session.isSmall);
+    await repeated?.catch((error) => states.fail(text('sessions.editsFailed'), error));
   }
 
   /** Opens the session that waits for its data, if these are among `files`. */

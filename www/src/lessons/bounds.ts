@@ -10,7 +10,13 @@ const MOST_NESTED = 40;
 /** Most formulas of a text, characters of one, and of all together. */
 const MOST_FORMULAS = 600;
 const MOST_OF_FORMULA = 1_000;
-const MOST_OF_FORMULAS = 40_000;
+const MOST_OF_FORMULAS = 15_000;
+/** How deep a formula may be nested, as braces, delimiters and environments: 40 of 140 roots within each other take seconds. */
+const MOST_NESTED_IN_FORMULA = 20;
+/** Signs that nest a formula; comments and quotations may contain the same, and are matched as a whole. */
+const NESTING = /%[^\n]*|\\verb\*?(?![a-zA-Z*])(.).*?\1|\\[a-zA-Z]+|\\[\s\S]|[{}]/g;
+const OPENING = ['{', '\\left', '\\begin', '\\begingroup', '\\bgroup'];
+const CLOSING = ['}', '\\right', '\\end', '\\endgroup', '\\egroup'];
 /** Most cells of formulas: typesetting 5,000 takes seconds, and a page of 40,000 two gigabytes. */
 const MOST_FORMULA_CELLS = 500;
 /** Ends of cells and rows in formulas. */
@@ -35,20 +41,25 @@ export function checkSteps(file: string, steps: number): void {
   if (steps > MOST_STEPS) throw tooMuch(file, text('lessons.stepCount'), MOST_STEPS);
 }
 
-/** Throws an Error if a text is too long, or has too many formulas, too long ones, or too large tables. */
+/** Throws an Error if a text is too long, or has too large tables. */
 export function checkText(file: string, source: string): void {
   checkLength(file, source);
-  let [count, length, cells] = [0, 0, 0];
-  for (const [formula] of source.matchAll(new RegExp(FORMULA, 'g'))) {
-    count += 1;
+  if (source.split('|').length > MOST_CELLS) throw tooMuch(file, text('lessons.cells'), MOST_CELLS);
+}
+
+/** Throws an Error if the formulas of a text are too many, too long, nested too deep, or have too many cells. */
+export function checkFormulas(file: string, formulas: string[]): void {
+  let [length, cells] = [0, 0];
+  for (const formula of formulas) {
     length += formula.length;
     cells += formula.match(CELL_END)?.length ?? 0;
     if (formula.length > MOST_OF_FORMULA) throw tooMuch(file, text('lessons.formulaCharacters'), MOST_OF_FORMULA);
+    if (nestingOfFormula(formula) > MOST_NESTED_IN_FORMULA)
+      throw tooMuch(file, text('lessons.formulaNested'), MOST_NESTED_IN_FORMULA);
   }
-  if (count > MOST_FORMULAS) throw tooMuch(file, text('lessons.formulas'), MOST_FORMULAS);
+  if (formulas.length > MOST_FORMULAS) throw tooMuch(file, text('lessons.formulas'), MOST_FORMULAS);
   if (length > MOST_OF_FORMULAS) throw tooMuch(file, text('lessons.formulasCharacters'), MOST_OF_FORMULAS);
   if (cells > MOST_FORMULA_CELLS) throw tooMuch(file, text('lessons.formulaCells'), MOST_FORMULA_CELLS);
-  if (source.split('|').length > MOST_CELLS) throw tooMuch(file, text('lessons.cells'), MOST_CELLS);
 }
 
 /** Returns whether a formula is typeset; others are shown as their source. */
@@ -66,6 +77,16 @@ function nesting(json: string): number {
   for (const character of json) {
     if (character === '[' || character === '{') deepest = Math.max(deepest, ++depth);
     if (character === ']' || character === '}') depth -= 1;
+  }
+  return deepest;
+}
+
+/** Returns how deep a formula is nested. */
+function nestingOfFormula(formula: string): number {
+  let [depth, deepest] = [0, 0];
+  for (const [sign] of formula.matchAll(NESTING)) {
+    if (OPENING.includes(sign)) deepest = Math.max(deepest, ++depth);
+    if (CLOSING.includes(sign)) depth -= 1;
   }
   return deepest;
 }

@@ -1,8 +1,9 @@
 /** A lesson: `lesson.json` and its text in Markdown, as docs/lessons.md describes them to authors. */
 import { labOf } from '../labs/address';
 import { text } from '../texts';
-import { checkData, checkSteps, checkText } from './bounds';
+import { checkData, checkFormulas, checkSteps, checkText } from './bounds';
 import { type Check, checkProblem, type Operand, operandProblem } from './check';
+import { formulasIn } from './formulas';
 import { unitNamed } from './units';
 
 /** Headings within a step, in the order in which they are shown; `answer` is for teachers only. */
@@ -57,6 +58,8 @@ export function parseLesson(files: LessonFiles, language: string): Lesson {
   if (source === undefined) throw new Error(text('lessons.noText', { file: textFile(used) }));
   checkText(textFile(used), source);
   const { title, intro, steps } = parseText(source);
+  const texts = [intro, ...steps.flatMap(({ parts }) => Object.values(parts))];
+  checkFormulas(textFile(used), texts.flatMap(formulasIn));
   if (steps.length !== data.steps.length)
     throw new Error(
       text('lessons.stepsDiffer', { file: textFile(used), headings: steps.length, steps: data.steps.length }),

@@ -1,6 +1,8 @@
 /** The part of markdown-it that lessons use; the package has no types of its own. */
 declare module 'markdown-it' {
   interface Token {
+    type: string;
+    children: Token[] | null;
     content: string;
     block: boolean;
     attrSet(name: string, value: string): void;
@@ -22,6 +24,7 @@ declare module 'markdown-it' {
     readonly renderer: Renderer;
     readonly utils: { escapeHtml(text: string): string };
     disable(rule: string): this;
+    parse(source: string, env: object): Token[];
     render(source: string): string;
   }
 }

@@ -7,9 +7,9 @@ const LEAST_EQUAL = 0.9;
 
 /**
  * Returns the number of labels if voxels look like those of a label map with several: whole numbers from 0 on, few
- * different ones, in pieces; else 0.
+ * different ones, in pieces; else 0. A map of a single label, a mask, counts if `least` is 1.
  */
-export function labelsLike(voxels: ArrayLike<number>): number {
+export function labelsLike(voxels: ArrayLike<number>, least = 2): number {
   if (voxels instanceof Float32Array || voxels instanceof Float64Array) return 0;
   const found = new Set<number>();
   let [equal, before] = [0, Number.NaN];
@@ -24,5 +24,5 @@ export function labelsLike(voxels: ArrayLike<number>): number {
     if (value !== 0) found.add(value);
     if (found.size > MOST_LABELS) return 0;
   }
-  return found.size > 1 && equal >= LEAST_EQUAL * voxels.length ? found.size : 0;
+  return found.size >= least && equal >= LEAST_EQUAL * voxels.length ? found.size : 0;
 }

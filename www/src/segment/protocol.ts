@@ -81,6 +81,8 @@ export interface OpenedLabels extends SurfaceUpdate {
 }
 
 export interface OpenedImage extends OpenedLabels {
+  /** Number of labels, if the volume looks like a label map; with several, it was opened as one. Else 0. */
+  looksLike: number;
   volume: VolumeView;
   params: ParamValues;
 }

@@ -39,6 +39,8 @@ export interface OpenVolume {
   map: OpenMap;
   /** Length of a world unit, if the volume's file states it. */
   unit: LengthUnit | undefined;
+  /** Number of labels, if the volume looks like a label map, which it then is, too, unless it has one label; else 0. */
+  looksLike: number;
 }
 
 /**
@@ -46,11 +48,11 @@ export interface OpenVolume {
  * one of the label map is used. A DICOM segmentation alone is both.
  */
 export async function openImage({ files, labelling }: ImageSource): Promise<OpenVolume> {
-  const [image, map] = await readBoth(files);
+  const { image, map, looksLike } = await readBoth(files);
   const volume = new Volume(image.init);
   try {
     const labels = map ? labelsOf(map, volume) : computed(volume, labelling);
-    return { volume, map: labels, unit: image.init.unit };
+    return { volume, map: labels, unit: image.init.unit, looksLike };
   } catch (error) {
     volume.free();
     throw error;
@@ -83,14 +85,27 @@ interface NamedVolume {
   isCropped: boolean;
 }
 
+interface Both extends Pick<OpenVolume, 'looksLike'> {
+  image: NamedVolume;
+  map: NamedVolume | undefined;
+}
+
 /** Reads the volume and, if the files contain two, the label map; one that names its labels, or looks like a map, is both. */
-async function readBoth(files: NamedBytes[]): Promise<[NamedVolume, NamedVolume?]> {
+async function readBoth(files: NamedBytes[]): Promise<Both> {
   const groups = groupFiles(files);
   if (groups.length > 2) throw new Refusal('bad-file', text('segment.atMostTwo', { count: groups.length }));
   const [first, second] = await Promise.all(groups.map(readMap));
   if (!first) throw new Refusal('bad-file', text('files.noFile'));
-  if (!second) return first.known.length > 0 || labelsLike(first.init.data) > 0 ? [first, first] : [first];
-  return isMap(first, second) ? [second, first] : [first, second];
+  if (!second) return alone(first);
+  const [map, image] = isMap(first, second) ? [first, second] : [second, first];
+  return { image, map, looksLike: 0 };
+}
+
+function alone(image: NamedVolume): Both {
+  if (image.known.length > 0) return { image, map: image, looksLike: 0 };
+  const looksLike = labelsLike(image.init.data, 1);
+  // A mask may as well be an image of two intensities.
+  return { image, map: looksLike > 1 ? image : undefined, looksLike };
 }
 
 /** Reads a label map, or what may be one, with what its file says of the labels. */

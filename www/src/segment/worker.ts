@@ -147,7 +147,8 @@ class Session {
       this.#open = opened;
       const all = this.#all(live, opened.map, began);
       const volume = { ...viewOf(opened.volume, name), ...displayOf(source) };
-      return withTransfer({ ...all, volume, params: { ...live.surfaces.params } }, [
+      const { looksLike } = opened;
+      return withTransfer({ ...all, volume, looksLike, params: { ...live.surfaces.params } }, [
         ...arraysOf(all),
         all.voxels,
         volume.voxels,

@@ -7,7 +7,7 @@ import { ArchiveTooLarge, MOST_FILES, unpack } from '../archive';
 import type { FileNotes, NamedBytes } from '../protocol';
 import { text } from '../texts';
 import { decode, encode, type Parts } from './codec';
-import { INDEX } from './recognise';
+import { INDEX, SMALL } from './recognise';
 import { checked, type Session, shown } from './schema';
 
 const FORMAT = 'vesicle-session';
@@ -19,8 +19,8 @@ const MOST_BYTES = 2 ** 30;
 /** Largest size of `session.json` in bytes, and most values in it. */
 const MOST_INDEX = 2 ** 27;
 const MOST_VALUES = 5e6;
-/** Largest size of a file that is small, and of the `session.json` in it. */
-const [SMALL, MOST_INDEX_OF_SMALL] = [2 ** 17, 2 ** 23];
+/** Largest size of the `session.json` in a small file. */
+const MOST_INDEX_OF_SMALL = 2 ** 23;
 
 export type { Session };
 

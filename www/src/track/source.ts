@@ -15,7 +15,7 @@ const CINE_SECONDS = 0.04;
 /** Digits of a proposed threshold, which is shown, and is in links and code: far finer than it could be chosen. */
 const THRESHOLD_DIGITS = 4;
 
-/** Opens a 4D image: reads it from files, or computes the phantom. */
+/** Opens a 4D image: reads it from files, or computes the phantom. One of a single frame is refused. */
 export async function openImage(source: ImageSource): Promise<Volume> {
   if ('cine' in source) {
     const { dims, spacing, frames } = source.cine;
@@ -26,7 +26,10 @@ export async function openImage(source: ImageSource): Promise<Volume> {
       frameSeconds: CINE_SECONDS,
     });
   }
-  return fromParts(groupFiles(source.files));
+  const image = await fromParts(groupFiles(source.files));
+  if (image.frames > 1) return image;
+  image.free();
+  throw new Refusal('invalid-argument', text('track.oneFrame'));
 }
 
 async function fromParts(parts: NamedBytes[][]): Promise<Volume> {

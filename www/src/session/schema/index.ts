@@ -19,7 +19,11 @@ type FieldsOf<Lab extends LabId> = Extract<Fields, { lab: Lab }>;
 /** The lab's own part of a session of a lab: its model, history, undo and view. */
 export type ContentOf<Lab extends LabId> = Omit<FieldsOf<Lab>, 'lab' | 'hash' | 'source'>;
 /** The session of a lab. */
-export type SessionOf<Lab extends LabId> = Pick<FieldsOf<Lab>, 'lab' | 'hash' | 'source'> & { content: ContentOf<Lab> };
+export type SessionOf<Lab extends LabId> = Pick<FieldsOf<Lab>, 'lab' | 'hash' | 'source'> & {
+  content: ContentOf<Lab>;
+  /** Whether its file is small, so that its edits may not give a large surface. */
+  isSmall?: boolean;
+};
 /** A lab as the user left it. */
 export type Session = { [Lab in LabId]: SessionOf<Lab> }[LabId];
 

@@ -1,0 +1,25 @@
+/** Markdown of lessons, as far as it is parsed: with formulas between dollar signs. Raw HTML is shown as text. */
+import MarkdownIt from 'markdown-it';
+import { FORMULA } from './bounds';
+
+const FORMULA_HERE = new RegExp(FORMULA, 'y');
+
+export const markdown = new MarkdownIt({ html: false, linkify: false }).disable('image');
+markdown.inline.ruler.before('escape', 'formula', (state, silent) => {
+  FORMULA_HERE.lastIndex = state.pos;
+  const [found, display, inline = ''] = FORMULA_HERE.exec(state.src) ?? [];
+  if (!found) return false;
+  if (!silent) {
+    const token = state.push('formula', 'span', 0);
+    token.content = display ?? inline;
+    token.block = display !== undefined;
+  }
+  state.pos += found.length;
+  return true;
+});
+
+/** Returns the formulas in a text, those that are typeset: dollar signs in code, for example, are no formulas. */
+export function formulasIn(source: string): string[] {
+  const tokens = markdown.parse(source, {}).flatMap(({ children }) => children ?? []);
+  return tokens.filter(({ type }) => type === 'formula').map(({ content }) => content);
+}
