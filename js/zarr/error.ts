@@ -1,15 +1,21 @@
 // Errors of OME-Zarr data and of the stores that it is read from.
 import { VesicleError } from '../error.js';
+import { shortened } from '../short-text.js';
+
+/** Most characters of a problem in a message: texts of metadata, and of packages that read them, may be in it. */
+const MOST_PROBLEM = 1000;
 
 /** Returns the `bad-file` error whose message names the part of the data and its problem; the caller throws it. */
 export function badZarr(part: string, problem: string): VesicleError {
-  return new VesicleError('bad-file', `OME-Zarr: ${part}: ${problem}`);
+  return new VesicleError('bad-file', textOf(part, problem));
 }
 
 /** Returns the `too-large` error about a part of the data; the caller throws it. */
 export function tooLarge(part: string, problem: string): VesicleError {
-  return new VesicleError('too-large', `OME-Zarr: ${part}: ${problem}`);
+  return new VesicleError('too-large', textOf(part, problem));
 }
+
+const textOf = (part: string, problem: string) => `OME-Zarr: ${shortened(part)}: ${shortened(problem, MOST_PROBLEM)}`;
 
 /** Formats a value of the metadata for an error message. */
 export function shown(value: unknown): string {
@@ -32,12 +38,15 @@ export function translated(zarrita: Zarrita, part: string, error: unknown): Vesi
   if (zarrita.isZarritaError(error, 'NotFoundError')) return badZarr(part, error.message);
   if (zarrita.isZarritaError(error, 'UnknownCodecError')) {
     const known = [...zarrita.registry.keys()].filter((name) => !name.startsWith('numcodecs.'));
-    return badZarr(part, `unsupported codec "${error.codec}"; supported: ${known.join(', ')}`);
+    return badZarr(part, `unsupported codec "${shortened(String(error.codec))}"; supported: ${known.join(', ')}`);
   }
   const { message, cause } = Object(error) as Error;
   const reason = cause instanceof Error ? ` (${cause.message})` : '';
   if (zarrita.isZarritaError(error, 'CodecPipelineError')) {
-    return badZarr(part, `truncated, damaged, or not encoded with "${error.codec}" as the metadata says${reason}`);
+    return badZarr(
+      part,
+      `truncated, damaged, or not encoded with "${shortened(String(error.codec))}" as the metadata says${reason}`,
+    );
   }
   return badZarr(part, `cannot be read: ${message}${reason}`);
 }

@@ -65,7 +65,6 @@ export class Level {
     selection: Selection,
   ) {
     [this.#zarrita, this.#array, this.#part] = [zarrita, array, `array "${transform.path}"`];
-    checkSizes(array, axes, this.#part);
     const type = TYPES[array.dtype as string];
     if (!type) {
       const known = Object.keys(TYPES).join(', ');
@@ -215,8 +214,9 @@ function shortenRow(from: LongArray, start: number, step: number, to: VoxelArray
   }
 }
 
-/** Throws `bad-file` unless all arrays have the same numbers of channels and times. */
+/** Throws `bad-file` unless all arrays have sizes, with the same numbers of channels and times. */
 export function checkSeries(arrays: readonly ZarrArray<'uint8'>[], { axes, levels }: Multiscale): void {
+  for (const [k, array] of arrays.entries()) checkSizes(array, axes, `array "${levels[k]?.path}"`);
   const sizes = ({ shape }: ZarrArray<'uint8'>) =>
     axes.flatMap((axis, index) => (axis === 'c' || axis === 't' ? [`${axis} ${shape[index]}`] : [])).join(', ');
   const [first] = arrays.map(sizes);

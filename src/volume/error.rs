@@ -13,7 +13,8 @@ pub enum VolumeError {
     },
     /// A contour would have more triangles than what starts from it may have.
     #[error(
-        "the contour has more than {most} triangles, which is the most: choose another iso value, a coarser volume, or another start"
+        "the contour has more than {most} triangles, which is the most: choose another iso value, a coarser volume, voxels more nearly \
+         cubes (long ones are divided), or another start"
     )]
     TooManyTriangles {
         /// Largest number of triangles.
