@@ -15,7 +15,7 @@ import { beatOf, warningsOf } from '../../www/src/track/curve';
 import { IMAGES } from '../../www/src/track/examples';
 import { interpolateSlice } from '../../www/src/track/interpolate-slice';
 import { TRACK_PRESETS, viewOf } from '../../www/src/track/presets';
-import { openImage, prepare } from '../../www/src/track/source';
+import { checkSmall, openImage, prepare } from '../../www/src/track/source';
 import { invert } from '../../www/src/view/anatomy';
 import { votesNear } from '../../www/src/view/votes';
 import { groupFiles } from '../../www/src/worker/file-groups';
@@ -313,6 +313,23 @@ describe('images', () => {
     const files = [{ name: 'still.nii', bytes: still.toNifti() }];
     still.free();
     await expect(openImage({ files })).rejects.toThrow('through at least two frames, and this image has one.');
+  });
+
+  test('of small files are refused where slices between would take the memory of the page', () => {
+    const image = { dims: [400, 400, 50] as [number, number, number], frames: 2 };
+    const thick = { ...image, spacing: [1, 1, 16] as [number, number, number] };
+    const source = (size: number) => ({ files: [{ name: 'film.nrrd', bytes: new Uint8Array(size) }] });
+    const flow = { binning: 1, enrichment: 'flow', factor: 0 } as const;
+    const message = 'the image would have 256 million voxels; files of at most 128 KiB may have 67 million.';
+    expect(() => checkSmall(source(1e5), thick, flow)).toThrow(message);
+    for (const preparation of [
+      { ...flow, binning: 2 },
+      { ...flow, factor: 2 },
+      { ...flow, enrichment: 'none' },
+    ] as const)
+      checkSmall(source(1e5), thick, preparation);
+    checkSmall(source(2e5), thick, flow);
+    checkSmall(source(1e5), { ...image, spacing: [1, 1, 3] }, flow);
   });
 
   test('are binned and enriched with slices as requested', async () => {

@@ -1,6 +1,7 @@
 /** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
 
 import { SurfaceTracker, Volume } from 'vesicle';
+import { SMALL } from '../session/recognise';
 import { text } from '../texts';
 import { invert } from '../view/anatomy';
 import { groupFiles } from '../worker/file-groups';
@@ -43,6 +44,35 @@ async function fromParts(parts: NamedBytes[][]): Promise<Volume> {
   } finally {
     for (const frame of frames) frame.free();
   }
+}
+
+/** The most voxels that an image of small files may have, with slices between its own. */
+const MOST_OF_SMALL = 2 ** 26;
+/** The largest factor by which the library multiplies slices. */
+const MOST_SLICES = 16;
+
+/** Throws a `Refusal` if small files would become an image that is too large for the memory of a page. */
+export function checkSmall(
+  source: ImageSource,
+  { dims, frames, spacing }: Pick<Volume, 'dims' | 'frames' | 'spacing'>,
+  preparation: Preparation,
+): void {
+  if (!('files' in source) || !enriches(preparation)) return;
+  if (source.files.reduce((sum, { bytes }) => sum + bytes.length, 0) > SMALL) return;
+  const [finest, middle, thickest] = [...spacing].sort((a, b) => a - b) as [number, number, number];
+  const factor =
+    preparation.factor || Math.min(MOST_SLICES, Math.max(1, Math.round(thickest / ((finest + middle) / 2))));
+  const voxels = (dims[0] * dims[1] * dims[2] * frames * factor) / preparation.binning ** 2;
+  if (voxels <= MOST_OF_SMALL) return;
+  const millions = (count: number) => Math.round(count / 1e6);
+  throw new Refusal(
+    'too-large',
+    text('track.smallTooLarge', {
+      millions: millions(voxels),
+      kilobytes: SMALL / 2 ** 10,
+      most: millions(MOST_OF_SMALL),
+    }),
+  );
 }
 
 /**

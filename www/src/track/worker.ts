@@ -30,7 +30,7 @@ import type {
   VolumeView,
   WorkerEvent,
 } from './protocol';
-import { buildTracker, openImage, prepare, proposeFor } from './source';
+import { buildTracker, checkSmall, openImage, prepare, proposeFor } from './source';
 
 /**
  * Parameters that the boundary depends on. If only others change, the boundary found in all frames is kept, provided
@@ -103,6 +103,7 @@ class Session {
     const spec = 'cine' in source ? source.cine : undefined;
     let made: Volume = original;
     try {
+      checkSmall(source, original, setup.preparation);
       made = prepare(original, setup.preparation, tell);
       const took = performance.now() - began;
       const ready = this.#adopt(made, setup, saved);
