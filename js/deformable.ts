@@ -428,12 +428,15 @@ export class DeformableModel implements Stepper {
     const { signal, onProgress } = checkedCoverage(given);
     signal?.throwIfAborted();
     const survey = this.#use((raw) => new Handle('survey', () => raw.surveyCoverage()));
+    let told = 0;
     const advance = () => {
       // The survey has its own copy of the surface, but freeing the model must still end it.
       const [coverage, share] = this.#handle.use(() =>
         survey.use((raw) => [raw.advance() as Coverage | undefined, raw.share()] as const),
       );
-      onProgress?.(share);
+      // Before and after triangles are tested, there is work, too.
+      if (share > told) onProgress?.(share);
+      told = share;
       return coverage;
     };
     try {
