@@ -1,5 +1,5 @@
 // Decoders that stop at the size of a chunk: a few bytes may decode to gigabytes, and two codecs multiply that.
-import type { Zarrita } from './error.js';
+import { badZarr, type Zarrita } from './error.js';
 
 type Registry = Zarrita['registry'];
 type Factory = NonNullable<ReturnType<Registry['get']>>;
@@ -27,6 +27,31 @@ const DECODERS: Record<string, Decode> = {
   lz4: checkedBefore((bytes) => uint32(bytes, 0)),
   zstd: checkedBefore(zstdSize),
 };
+
+/** The most codecs of an array, those of the chunks in its shards included: a chunk is decoded by all of them in one go. */
+const MOST_CODECS = 8;
+
+/** Throws `bad-file` for the metadata of an array with too many codecs. */
+export function checkCodecs(key: string, metadata: Uint8Array): void {
+  const count = codecsIn(parsed(metadata));
+  if (count > MOST_CODECS) throw badZarr(key, `must have at most ${MOST_CODECS} codecs, got ${count}`);
+}
+
+/** Returns a value of JSON; undefined for what is none, of which zarrita says what is wrong. */
+function parsed(bytes: Uint8Array): unknown {
+  try {
+    return JSON.parse(new TextDecoder().decode(bytes));
+  } catch {
+    return undefined;
+  }
+}
+
+/** Returns the number of codecs of an array of Zarr 2 or 3, or of the configuration of a codec. */
+function codecsIn(value: unknown): number {
+  const { codecs, index_codecs, filters } = Object(value) as Record<string, unknown>;
+  const lists = [codecs, index_codecs, filters].filter((list) => Array.isArray(list));
+  return lists.flat().reduce((sum: number, codec) => sum + 1 + codecsIn(Object(codec).configuration), 0);
+}
 
 const bounded = new WeakSet<Registry>();
 

@@ -3,6 +3,7 @@ import type { AsyncReadable, GetOptions, RangeQuery, Readable } from '@zarrita/s
 import { onAbort } from '../abort.js';
 import { VesicleError } from '../error.js';
 import { isSmall, SMALL } from '../small-files.js';
+import { checkCodecs } from './codecs.js';
 import { badZarr, RefusedError, tooLarge } from './error.js';
 
 /** Duration of the pause before the first repetition, milliseconds; each later one is twice as long. */
@@ -119,6 +120,7 @@ export class Requests implements AsyncReadable {
     if (this.#metadata > MOST_METADATA)
       throw badZarr(key, `with it, the metadata of the image have more than ${MOST_METADATA} bytes, which is the most`);
     if (isNestedDeeply(bytes)) throw badZarr(key, `brackets are nested more than ${MOST_NESTED} deep`);
+    checkCodecs(key, bytes);
   }
 
   async #getRange(key: Key, range: RangeQuery, given: FileOptions = {}): Promise<Uint8Array | undefined> {

@@ -96,6 +96,21 @@ describe('decoders stop at the size of a chunk', () => {
     expect(grown).toBeLessThan(60e6);
   });
 
+  test('of hundreds of codecs are refused, in shards, too', async () => {
+    const many = Array(500).fill({ name: 'crc32c' });
+    const chunks = [{ name: 'bytes', configuration: { endian: 'little' } }];
+    const shard = {
+      chunk_shape: [4, 4, 4],
+      codecs: [...chunks, ...many],
+      index_codecs: [...chunks, { name: 'crc32c' }],
+    };
+    for (const codecs of [many, [{ name: 'sharding_indexed', configuration: shard }]]) {
+      const error = await rejection(openZarr(new TestStore(image({ ...CUBE, codecs }))));
+      expect(error.code).toBe('bad-file');
+      expect(error.message).toMatch(/must have at most 8 codecs, got 50\d/);
+    }
+  });
+
   test('for others that use the same zarrita, too, and only for what is larger', async () => {
     const voxels = Uint8Array.from({ length: 512 }, (_, index) => index);
     const store = withChunk({ ...CUBE, codecs: [gzip, gzip] }, gzipSync(gzipSync(voxels)));
