@@ -220,9 +220,14 @@ export class DeformableModel implements Stepper {
     if (created) {
       this.#volume = created.volume;
       this.#handle = created.handle;
+      this.#sparse = created.sparse;
     } else if (source) {
-      this.#sparse = { source, volume: source.create() };
-      this.#handle = onSparse(this.#sparse, options);
+      const sparse = { source, volume: source.create() };
+      this.#sparse = sparse;
+      this.#handle = orFreed(sparse, () => {
+        const make = onSparse(sparse, options, (...of) => RawDeformable.newSparse(...of));
+        return new Handle('DeformableModel', make);
+      });
     } else {
       this.#volume = volumeHandle('volume', options.volume as Volume);
       const make = dense(this.#volume, options, (...of) => new RawDeformable(...of));
@@ -237,8 +242,7 @@ export class DeformableModel implements Stepper {
 
   /**
    * Creates a model as the constructor does, bit for bit, yielding to the event loop between slices of work: the initial
-   * surface of a large or noisy volume takes seconds. That of a {@link LargeVolume} is created at once. The volume must not
-   * be freed before.
+   * surface of a large or noisy volume takes seconds. The volume must not be freed before.
    *
    * @param options - `signal`: aborts the creation; `budgetMs`: duration of a slice, milliseconds, default 12.
    * @throws As the constructor; `signal.reason` when aborted.
@@ -247,16 +251,25 @@ export class DeformableModel implements Stepper {
     const { signal, budgetMs } = checkedSlices(options);
     signal?.throwIfAborted();
     const checkedOptions = checked(given);
-    if (sparseSource(checkedOptions.volume)) return new DeformableModel(given);
-    const volume = volumeHandle('volume', checkedOptions.volume as Volume);
-    const begin = dense(volume, checkedOptions, (...of) => new RawDeformableCreation(...of));
-    const creation = new Handle('DeformableModel', begin);
+    const source = sparseSource(checkedOptions.volume);
+    const sparse = source && { source, volume: source.create() };
+    const volume = source ? undefined : volumeHandle('volume', checkedOptions.volume as Volume);
+    const begin = () =>
+      sparse
+        ? onSparse(sparse, checkedOptions, (...of) => RawDeformableCreation.newSparse(...of))()
+        : dense(volume as Handle<RawVolume>, checkedOptions, (...of) => new RawDeformableCreation(...of))();
+    let creation: Handle<RawDeformableCreation> | undefined;
     try {
-      const raw = await runInSlices(() => creation.use((one) => one.advance()), signal, budgetMs);
+      creation = new Handle('DeformableModel', begin);
+      const begun = creation;
+      const raw = await runInSlices(() => begun.use((one) => one.advance()), signal, budgetMs);
       const handle = new Handle('DeformableModel', () => raw);
-      return new DeformableModel(new Created(checkedOptions, volume, handle) as unknown as DeformableOptions);
+      return new DeformableModel(new Created(checkedOptions, volume, handle, sparse) as unknown as DeformableOptions);
+    } catch (error) {
+      sparse?.volume.free();
+      throw error;
     } finally {
-      creation.free();
+      creation?.free();
     }
   }
 
@@ -518,8 +531,9 @@ type Options = Partial<DeformableOptions>;
 class Created {
   constructor(
     readonly options: Options,
-    readonly volume: Handle<RawVolume>,
+    readonly volume: Handle<RawVolume> | undefined,
     readonly handle: Handle<RawDeformable>,
+    readonly sparse: SparseParts | undefined,
   ) {}
 }
 
@@ -537,17 +551,25 @@ function dense<T>(
   return () => volume.use((raw) => make(raw, frame, rawStart(start), levels, edge, params));
 }
 
-function onSparse({ volume }: SparseParts, options: Options): Handle<RawDeformable> {
+/** Returns a function that makes what needs the arguments of a model of a volume larger than memory. */
+function onSparse<T>(
+  { volume }: SparseParts,
+  options: Options,
+  make: (...of: Parameters<typeof RawDeformable.newSparse>) => T,
+): () => T {
   const params = shallowCopy('params', options.params ?? {});
   const { start = 'contour', finest = 0, edge, box } = options;
+  for (const name of ['frame', 'levels'] as const) {
+    if (options[name] !== undefined) throw invalid(name, 'not for volumes larger than memory');
+  }
+  const [corners, outside] = box ? checkedBox(box) : [];
+  return () => volume.use((raw) => make(raw, rawStart(start), finest, edge, outside, corners, params));
+}
+
+/** Returns what `work` does; if it throws, the volume of a model that there is not to be is freed. */
+function orFreed<T>({ volume }: SparseParts, work: () => T): T {
   try {
-    for (const name of ['frame', 'levels'] as const) {
-      if (options[name] !== undefined) throw invalid(name, 'not for volumes larger than memory');
-    }
-    const [corners, outside] = box ? checkedBox(box) : [];
-    return new Handle('DeformableModel', () =>
-      volume.use((raw) => RawDeformable.newSparse(raw, rawStart(start), finest, edge, outside, corners, params)),
-    );
+    return work();
   } catch (error) {
     volume.free();
     throw error;

@@ -98,7 +98,7 @@ fn options(
 
 /// A model that is being created in slices.
 #[wasm_bindgen]
-pub struct RawDeformableCreation(Computation<Result<DeformableModel, MethodError>>);
+pub struct RawDeformableCreation(pub(super) Computation<Result<DeformableModel, MethodError>>);
 
 #[wasm_bindgen]
 impl RawDeformableCreation {

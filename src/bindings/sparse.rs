@@ -5,7 +5,7 @@ use serde::Serialize;
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::convert::{doubles, point, to_js, with_overrides};
-use super::deformable::{RawDeformable, RawStart};
+use super::deformable::{RawDeformable, RawDeformableCreation, RawStart};
 use super::error::Failure;
 use super::stepping::Stepping;
 use super::volume::{voxels, world};
@@ -112,12 +112,43 @@ impl RawDeformable {
         within: Option<Float64Array>,
         params: &JsValue,
     ) -> Result<RawDeformable, JsValue> {
-        let params = Some(with_overrides(&DeformableParams::for_range(volume.0.range()), params)?);
-        let within = within.map(|corners| world_box(&corners)).transpose()?;
-        let options = SparseOptions { start: start.0, finest, edge, params, within, whole };
+        let options = options(volume, start, finest, edge, whole, within, params)?;
         let model = DeformableModel::on_sparse(&volume.0, options).map_err(Failure::from)?;
         Ok(RawDeformable(Stepping::new(model)))
     }
+}
+
+#[wasm_bindgen]
+impl RawDeformableCreation {
+    /// Begins to create the model that `newSparse` of `RawDeformable` creates.
+    #[wasm_bindgen(js_name = newSparse)]
+    pub fn new_sparse(
+        volume: &RawSparseVolume,
+        start: RawStart,
+        finest: usize,
+        edge: Option<f64>,
+        whole: Option<usize>,
+        within: Option<Float64Array>,
+        params: &JsValue,
+    ) -> Result<RawDeformableCreation, JsValue> {
+        let options = options(volume, start, finest, edge, whole, within, params)?;
+        let creation = DeformableModel::begin_on_sparse(&volume.0, options).map_err(Failure::from)?;
+        Ok(RawDeformableCreation(std::boxed::Box::pin(creation)))
+    }
+}
+
+fn options(
+    volume: &RawSparseVolume,
+    start: RawStart,
+    finest: usize,
+    edge: Option<f64>,
+    whole: Option<usize>,
+    within: Option<Float64Array>,
+    params: &JsValue,
+) -> Result<SparseOptions, Failure> {
+    let params = Some(with_overrides(&DeformableParams::for_range(volume.0.range()), params)?);
+    let within = within.map(|corners| world_box(&corners)).transpose()?;
+    Ok(SparseOptions { start: start.0, finest, edge, params, within, whole })
 }
 
 fn world_box(corners: &Float64Array) -> Result<WorldBox, Failure> {

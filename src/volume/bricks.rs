@@ -2,7 +2,7 @@
 //!
 //! A missing brick is a question, never a value: reads of it are recorded, and whoever reads has to discard the result.
 
-use super::error::{VolumeError, filled};
+use super::error::{VolumeError, filled, reserve};
 use super::grid::{CellCache, Padding, share_of_padded, share_of_values};
 use super::sampling::{blend, locate};
 use super::voxels::{VoxelNumber, Voxels, each, map_each};
@@ -344,17 +344,31 @@ impl BrickGrid {
     /// # Errors
     /// [`VolumeError::TooLarge`].
     pub fn part(&self, region: Region) -> Result<Option<Grid>, VolumeError> {
-        let mut values = filled(region.len(), 0.0)?;
+        let mut values = reserve(region.len())?;
         let mut is_whole = true;
-        for (k, value) in values.iter_mut().enumerate() {
-            let [nx, ny, _] = region.dims;
-            let offset = [k % nx, k / nx % ny, k / nx / ny];
-            match self.value([0, 1, 2].map(|axis| region.min[axis] + offset[axis])) {
-                Some(found) => *value = found,
-                None => is_whole = false,
-            }
+        let [width, height, depth] = region.dims;
+        for (z, y) in (0..depth).flat_map(|z| (0..height).map(move |y| (z, y))) {
+            let row = [region.min[0], region.min[1] + y, region.min[2] + z];
+            is_whole &= self.append_row(row, width, &mut values);
         }
         Ok(is_whole.then_some(Grid { dims: region.dims, values }))
+    }
+
+    /// Appends the values of `count` voxels along x to `values`, brick by brick; returns whether all of them are there.
+    fn append_row(&self, [first, y, z]: [usize; 3], count: usize, values: &mut Vec<f32>) -> bool {
+        let (mut x, end, mut is_whole) = (first, first + count, true);
+        while x < end {
+            let in_brick = (BRICK - x % BRICK).min(end - x);
+            let start = index_in_brick([x, y, z].map(|k| k % BRICK));
+            match self.brick_with([x, y, z]) {
+                Some(brick) => each!(&brick.voxels, stored => {
+                    values.extend(stored[start..start + in_brick].iter().map(|&value| self.normalised(value)));
+                }),
+                None => is_whole = false,
+            }
+            x += in_brick;
+        }
+        is_whole
     }
 }
 

@@ -125,6 +125,24 @@ test('the surface is that of the object, with its cavity', async () => {
   expect(Math.min(...r)).toBeGreaterThan(CAVITY - 0.6);
 });
 
+test('a model can be created in slices, with the same bits, and not if that is aborted', async () => {
+  const image = await open(16);
+  const whole = new DeformableModel({ volume: image, params: PARAMS });
+  const sliced = await DeformableModel.create({ volume: image, params: PARAMS }, { budgetMs: 0.1 });
+  expect(bits(sliced)).toBe(bits(whole));
+  expect((await sliced.run()).done).toBe(true);
+  expect(bits(sliced) === REFERENCE).toBe(true);
+  for (const model of [whole, sliced]) model.free();
+  const stop = new AbortController();
+  // Runs only if the creation lets it.
+  setTimeout(() => stop.abort(new Error('enough')));
+  const options = { signal: stop.signal, budgetMs: 0.1 };
+  await expect(DeformableModel.create({ volume: image }, options)).rejects.toThrow('enough');
+  const error = await rejection(DeformableModel.create({ volume: image, levels: 1 }));
+  expect([error.code, error.message]).toEqual(['invalid-argument', expect.stringContaining('levels')]);
+  image.free();
+});
+
 test('the bits do not depend on chunks, their order, the cache or interruptions', async () => {
   for (const chunk of IMAGES.keys()) expect((await surface(await open(chunk))) === REFERENCE, `${chunk}`).toBe(true);
   for (let seed = 1; seed <= 20; seed++) {

@@ -546,7 +546,11 @@ impl Pyramid {
     /// # Errors
     /// [`MethodError::InvalidArgument`] if there is no such level; [`MethodError::NeedsData`] unless the coarsest level
     /// is loaded whole; [`MethodError::Volume`] if memory does not suffice.
-    pub(super) fn of_sparse(volume: &SparseVolume, finest: usize) -> Result<Self, MethodError> {
+    pub(super) async fn of_sparse(
+        volume: &SparseVolume,
+        finest: usize,
+        pauses: &Pauses,
+    ) -> Result<Self, MethodError> {
         let all = volume.levels();
         let Some(&first) = all.get(finest) else {
             return Err(MethodError::invalid("finest", format!("must be below {}, got {finest}", all.len())));
@@ -556,6 +560,7 @@ impl Pyramid {
             return Err(MethodError::NeedsData { needs: volume.missing(last)? });
         };
         let coarsest = FrameGrid::from(coarsest);
+        pauses.now().await;
         let hash = hash_of(&coarsest, Region { min: [0; 3], dims: coarsest.dims() });
         let spacing = spacing_of(&first.affine);
         let parts = parts_of(spacing);

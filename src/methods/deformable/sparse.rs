@@ -163,16 +163,33 @@ impl DeformableModel {
     /// option or parameter that is not accepted, also for gradient forces and the parameter `seeding` on, which sparse
     /// volumes do not have; otherwise as [`Self::new`].
     pub fn on_sparse(volume: &SparseVolume, options: SparseOptions) -> Result<Self, MethodError> {
+        finished(Self::begin_on_sparse(volume, options)?)
+    }
+
+    /// Begins to create a model as [`Self::on_sparse`] does, in [slices](crate::pauses).
+    ///
+    /// # Errors
+    /// As [`Self::on_sparse`], now or at the end.
+    pub fn begin_on_sparse(
+        volume: &SparseVolume,
+        options: SparseOptions,
+    ) -> Result<impl Future<Output = Result<Self, MethodError>> + use<>, MethodError> {
         let params = options.params.clone().unwrap_or_else(|| DeformableParams::for_range(volume.range()));
         params.validate()?;
         check_params(&params)?;
-        let pyramid = Pyramid::of_sparse(volume, options.finest)?;
-        let affine = volume.levels()[options.finest].affine;
-        let follow = follow(volume, &options, &pyramid.to_world(&affine))?;
-        let origin = Origin { frame: 0, start: options.start, edge: options.edge, params };
-        let mut model = finished(Self::from_pyramid(pyramid, affine, origin, &Pauses::default()))?;
-        model.follow = follow;
-        Ok(model)
+        let volume = volume.clone();
+        Ok(async move {
+            let pauses = Pauses::default();
+            pauses.now().await;
+            let pyramid = Pyramid::of_sparse(&volume, options.finest, &pauses).await?;
+            pauses.now().await;
+            let affine = volume.levels()[options.finest].affine;
+            let follow = follow(&volume, &options, &pyramid.to_world(&affine))?;
+            let origin = Origin { frame: 0, start: options.start, edge: options.edge, params };
+            let mut model = Self::from_pyramid(pyramid, affine, origin, &pauses).await?;
+            model.follow = follow;
+            Ok(model)
+        })
     }
 
     /// Returns an error if the volume is sparse, so that no level but the coarsest can be read whole.
