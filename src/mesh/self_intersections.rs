@@ -82,7 +82,7 @@ const MOST_TESTED: [usize; 2] = [20_000_000, 60];
 
 /// The number of self-intersections of a mesh, as far as they were counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct CountInTime {
+pub(crate) struct CountInTime {
     pub found: usize,
     /// Whether all pairs of triangles that may intersect were tested, and all that do were counted. Where not, there may be
     /// more, even if none was found: boxes of triangles around a vertex of thousands overlap, whether or not they intersect.
@@ -91,7 +91,7 @@ pub(super) struct CountInTime {
 
 /// Counts self-intersections as [`count_self_intersections`] does, but stops where so many triangles lie on each other that
 /// time would be quadratic. Triangles with the same corners are tested once.
-pub(super) async fn count_in_time(mesh: &TriangleMesh, pauses: &Pauses) -> CountInTime {
+pub(crate) async fn count_in_time(mesh: &TriangleMesh, pauses: &Pauses) -> CountInTime {
     count_within(mesh, MOST_TESTED, pauses).await
 }
 

@@ -149,7 +149,7 @@ impl Start {
             Self::Bubbles(n) => bubble_grid(context, *n)?,
             Self::Seeds { points, radius } => spheres_at(context, points, *radius)?,
             Self::MarchingCubes(value) => iso_surface(context, iso(*value), pauses).await?,
-            Self::Mesh(mesh) => caller_mesh(context, mesh)?,
+            Self::Mesh(mesh) => caller_mesh(context, mesh, pauses).await?,
         };
         let most = context.most_vertices();
         let mut resolver = resolve_all(&mut mesh, most, context.sampling, guide, pauses).await?;
@@ -429,11 +429,15 @@ async fn iso_surface(context: &StartContext<'_>, iso: f32, pauses: &Pauses) -> R
     Ok(Mesh::from_triangles(&placed(surface, position))?)
 }
 
-fn caller_mesh(context: &StartContext, mesh: &TriangleMesh) -> Result<Mesh, MethodError> {
+async fn caller_mesh(
+    context: &StartContext<'_>,
+    mesh: &TriangleMesh,
+    pauses: &Pauses,
+) -> Result<Mesh, MethodError> {
     let local = mesh.transformed(&context.from_world);
     if let Some(far) = local.positions.iter().position(|&p| !context.domain.bounds.contains(p)) {
         let problem = format!("vertex {far} at {} is outside the image's domain", mesh.positions[far]);
         return Err(MethodError::invalid("start.mesh", problem));
     }
-    checked_mesh("start.mesh", &local)
+    checked_mesh("start.mesh", &local, pauses).await
 }

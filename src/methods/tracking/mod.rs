@@ -256,9 +256,11 @@ impl SurfaceTracker {
             noise,
             range: region.span(),
         };
-        let start = start
-            .as_ref()
-            .map_or(Ok(region.space.empty_mesh()), |mesh| start::validate_start(mesh, &region))?;
+        let start = match &start {
+            Some(mesh) => start::validate_start(mesh, &region, &pauses).await?,
+            None => region.space.empty_mesh(),
+        };
+        pauses.now().await;
         let mut tracker = Self {
             voting: BoundaryVoting::new(Window::default(), 0),
             mesh: start.clone(),
@@ -285,6 +287,7 @@ impl SurfaceTracker {
         };
         tracker.params = tracker.with_defaults(params)?;
         tracker.fingerprint = tracker.input_hash();
+        pauses.now().await;
         tracker.restart();
         Ok(tracker)
     }

@@ -28,15 +28,21 @@ const MIN_EDGE: f64 = 0.1;
 /// # Errors
 /// [`MethodError::InvalidArgument`] if its edges are too short, or none of its vertices is in the box; the errors of
 /// [`checked_mesh`].
-pub(super) fn validate_start(start: &TriangleMesh, region: &Region) -> Result<Mesh, MethodError> {
+pub(super) async fn validate_start(
+    start: &TriangleMesh,
+    region: &Region,
+    pauses: &Pauses,
+) -> Result<Mesh, MethodError> {
     let rebased = start.relative_to(region.space.origin);
-    let mesh = checked_mesh("start", &rebased)?;
+    let mesh = checked_mesh("start", &rebased, pauses).await?;
+    pauses.now().await;
     let (edge, least) = (measure(&rebased).edge_mean, MIN_EDGE * region.shortest_side());
     if edge < least {
         let problem =
             format!("the mean edge length must be ≥ {least:.1e} (a tenth of a voxel), got {edge:.1e}");
         return Err(MethodError::invalid("start", problem));
     }
+    pauses.now().await;
     let mut surface = mesh.clone();
     region.space.enter(&mut surface);
     if surface.vertices().all(|v| region.clamp_into_box(region.to_local(surface.position(v))).is_some()) {
