@@ -283,7 +283,7 @@ test('with memory nearly full, calls fail with a named error and succeed again o
       const error = fill(bytes);
       if (error.code !== 'too-large') throw error;
     }
-    const size = 128;
+    const size = 256;
     const voxels = Uint8Array.from({ length: size ** 3 }, (_, i) => (Math.sin(i) > 0 ? 255 : 0));
     const work = {
       voxels: () => new Volume({ data: voxels, dims: [size, size, size] }).pyramid(2),
@@ -310,7 +310,7 @@ test('with memory nearly full, calls fail with a named error and succeed again o
   const args = ['--input-type=module', '--eval', script];
   const { count, came } = JSON.parse(execFileSync(process.execPath, args, { cwd: root, encoding: 'utf8' }));
   expect(count).toBeGreaterThan(4);
-  expect(came.afterwards).toBe('128,128,128');
+  expect(came.afterwards).toBe('256,256,256');
   expect(came.voxels).toBe('too-large');
   for (const what of ['sphere', 'model']) expect(['made', 'too-large', 'VesicleCrash']).toContain(came[what]);
 });
