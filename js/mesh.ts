@@ -564,8 +564,8 @@ export class Mesh {
    *
    * @param edge - Bounds of edge lengths, world units: `min` above 0, `max` more than twice `min`.
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first;
-   *   `too-large` where more than four million vertices would be needed, or as in {@link Mesh.smooth}; `precision` where `max` is below 64 times the
-   *   spacing of single-precision numbers at the largest coordinate.
+   *   `too-large` where more than four million vertices would be needed, or as in {@link Mesh.smooth}; `precision` where
+   *   `max` is below 64 times the spacing of single-precision numbers at the largest coordinate.
    */
   remesh(edge: { min: number; max: number }): void {
     const [min, max] = edgeBounds(edge);
@@ -587,8 +587,8 @@ export class Mesh {
    *   encloses; default true. Volume is given back where it was lost, so that thin parts stay and lengths are kept. Where
    *   vertices cannot move without self-intersections, the volume may differ.
    * @throws {@link VesicleError} `not-closed`; `invalid-argument`, also for the mesh of a model: `clone()` it first;
-   *   `too-large` where so many vertices are near each other, as in a mesh that intersects itself everywhere, that there is
-   *   no memory to test their triangles. The mesh is then unchanged.
+   *   `too-large` where more pairs of vertices are near each other than there is memory to test, as in a mesh that
+   *   intersects itself everywhere. The mesh is then unchanged.
    */
   smooth(options: { iterations: number; keepVolume?: boolean }): void {
     const [count, keepVolume] = smoothing(options);

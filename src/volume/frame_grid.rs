@@ -196,7 +196,7 @@ impl FrameGrid {
         }
     }
 
-    /// Returns the next coarser level of the pyramid, as [`Grid::reduce_along`].
+    /// Returns the next coarser level of the pyramid, as [`pyramid::reduce_along`].
     ///
     /// # Errors
     /// As [`Grid::reduce`].
@@ -273,7 +273,7 @@ mod tests {
                 assert_eq!(grid.part(region).unwrap(), stored.part(region).unwrap());
                 assert_eq!(grid.sobel().unwrap(), stored.sobel().unwrap());
                 let axes = [true, true, false];
-                let reduced = stored.reduce_along(axes, [1.0; 3], 1.0, 1.7).unwrap();
+                let reduced = FrameGrid::from(stored.clone()).reduce_along(axes, [1.0; 3], 1.0, 1.7).unwrap();
                 assert_eq!(grid.reduce_along(axes, [1.0; 3], 1.0, 1.7).unwrap(), reduced);
                 let padding = Padding { background: 0.1, iso: 0.4 };
                 for _ in 0..200 {

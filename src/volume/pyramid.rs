@@ -134,22 +134,7 @@ impl Grid {
     /// # Errors
     /// `factor` not in (1, 2], `spacing` or `unit` not positive and finite; [`VolumeError::TooLarge`].
     pub fn reduce(&self, spacing: [f64; 3], unit: f64, factor: f64) -> Result<(Grid, [f64; 3]), VolumeError> {
-        self.reduce_along([true; 3], spacing, unit, factor)
-    }
-
-    /// Returns the next coarser level as [`Self::reduce`], but with fewer voxels only along the axes that `axes` marks; it
-    /// is smoothed along the others, too.
-    ///
-    /// # Errors
-    /// As [`Self::reduce`].
-    pub(crate) fn reduce_along(
-        &self,
-        axes: [bool; 3],
-        spacing: [f64; 3],
-        unit: f64,
-        factor: f64,
-    ) -> Result<(Grid, [f64; 3]), VolumeError> {
-        reduce_along(self.dims, |z| Ok(self.slice(z)), axes, spacing, [unit, factor])
+        reduce_along(self.dims, |z| Ok(self.slice(z)), [true; 3], spacing, [unit, factor])
     }
 
     /// Updates `coarse`, which [`Self::reduce`] returned for this grid and the same `spacing`, `unit` and `factor`,
@@ -168,7 +153,7 @@ impl Grid {
         self.update_reduced_along([true; 3], coarse, changed, spacing, steps)
     }
 
-    /// Updates a level that [`Self::reduce_along`] returned, as [`Self::update_reduced`]; `steps` are `unit` and `factor`.
+    /// Updates a level that [`reduce_along`] returned, as [`Self::update_reduced`]; `steps` are `unit` and `factor`.
     ///
     /// # Errors
     /// As [`Self::reduce`].
@@ -198,14 +183,16 @@ impl Grid {
         Ok(Some(to))
     }
 
-    fn slice(&self, z: usize) -> &[f32] {
+    /// Returns the values of the slice with the index `z`, row by row.
+    pub(super) fn slice(&self, z: usize) -> &[f32] {
         let size = self.dims[0] * self.dims[1];
         &self.values[z * size..(z + 1) * size]
     }
 }
 
-/// Returns what [`Grid::reduce_along`] does, of a grid of `dims` whose slices across z `slice` returns; the last argument is
-/// `unit` and `factor`.
+/// Returns the next coarser level and its spacing as [`Grid::reduce`] does, but with fewer voxels only along the axes that
+/// `axes` marks; it is smoothed along the others, too. `slice` returns the slices across z of the grid, of `dims` voxels; the
+/// last argument is `unit` and `factor`.
 pub(super) fn reduce_along<S: AsRef<[f32]>>(
     dims: [usize; 3],
     slice: impl Fn(usize) -> Result<S, VolumeError>,
@@ -275,7 +262,7 @@ fn blend_rows(values: &[f32], nx: usize, taps: &ResamplingWeights, out: &mut Vec
     }
 }
 
-/// Returns the weights along each axis that reduce a grid of `dims` as [`Grid::reduce_along`] does; the last argument is
+/// Returns the weights along each axis that reduce a grid of `dims` as [`reduce_along`] does; the last argument is
 /// `unit` and `factor`.
 fn reduction(
     dims: [usize; 3],

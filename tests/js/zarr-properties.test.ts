@@ -103,7 +103,7 @@ function storeOf(metadata: Map<string, Json>) {
   return { get: async (key: string) => bytesOf(metadata.get(key)) };
 }
 
-/** Opens metadata, reads the coarsest level if there is one, and tests what holds for any. */
+/** Opens the image that metadata describe, unless they are refused, and tests what holds for any image. */
 async function openAny(metadata: Map<string, Json>): Promise<void> {
   const image = await bounded(() => openZarr(storeOf(metadata), { retries: 0 }));
   if (image instanceof Error) return;
