@@ -28,7 +28,14 @@ import {
   type Stepper,
   type StepReport,
 } from './stepper.js';
-import { RawDeformable, RawDeformableCreation, RawStart, type RawVolume } from './vesicle.js';
+import {
+  RawDeformable,
+  RawDeformableCreation,
+  RawDeformableOptions,
+  RawSparseOptions,
+  RawStart,
+  type RawVolume,
+} from './vesicle.js';
 import { checkedRegion, type Volume, volumeHandle } from './volume.js';
 import { ModelWarnings } from './warnings.js';
 
@@ -176,6 +183,12 @@ export interface DeformableOptions {
    * that is more, and shorter than the object.
    */
   edge?: number;
+  /**
+   * Largest number of vertices of the surface, default and at most 4 million; a run that would exceed it fails with
+   * `too-large`. A contour that the surface starts from has at most four times as many triangles. Fewer bound memory and
+   * time where volumes come from strangers.
+   */
+  maxVertices?: number;
   /** Initial parameters: any subset; the others have their defaults. */
   params?: DeformableParams;
 }
@@ -186,7 +199,7 @@ export interface DeformableRunOptions extends RunOptions {
   onData?: DataOptions['onData'];
 }
 
-const OPTIONS = ['volume', 'frame', 'start', 'levels', 'finest', 'box', 'edge', 'params'];
+const OPTIONS = ['volume', 'frame', 'start', 'levels', 'finest', 'box', 'edge', 'maxVertices', 'params'];
 const RUN_OPTIONS = ['signal', 'maxIterations', 'budgetMs', 'onStep', 'onData'];
 
 /**
@@ -544,11 +557,17 @@ function dense<T>(
   make: (...of: ConstructorParameters<typeof RawDeformable>) => T,
 ): () => T {
   const params = shallowCopy('params', options.params ?? {});
-  const { frame = 0, start = 'contour', levels = 0, edge } = options;
+  const { frame = 0, start = 'contour', levels = 0, edge, maxVertices } = options;
   for (const name of ['finest', 'box'] as const) {
     if (options[name] !== undefined) throw invalid(name, 'only for volumes larger than memory');
   }
-  return () => volume.use((raw) => make(raw, frame, rawStart(start), levels, edge, params));
+  return () =>
+    volume.use((raw) => {
+      const of = new RawDeformableOptions(raw, rawStart(start), params);
+      of.setFrame(frame, levels);
+      of.setSize(edge, maxVertices);
+      return make(raw, of);
+    });
 }
 
 /** Returns a function that makes what needs the arguments of a model of a volume larger than memory. */
@@ -558,12 +577,18 @@ function onSparse<T>(
   make: (...of: Parameters<typeof RawDeformable.newSparse>) => T,
 ): () => T {
   const params = shallowCopy('params', options.params ?? {});
-  const { start = 'contour', finest = 0, edge, box } = options;
+  const { start = 'contour', finest = 0, edge, maxVertices, box } = options;
   for (const name of ['frame', 'levels'] as const) {
     if (options[name] !== undefined) throw invalid(name, 'not for volumes larger than memory');
   }
   const [corners, outside] = box ? checkedBox(box) : [];
-  return () => volume.use((raw) => make(raw, rawStart(start), finest, edge, outside, corners, params));
+  return () =>
+    volume.use((raw) => {
+      const of = new RawSparseOptions(raw, rawStart(start), params);
+      of.setLevels(finest, outside, corners);
+      of.setSize(edge, maxVertices);
+      return make(raw, of);
+    });
 }
 
 /** Returns what `work` does; if it throws, the volume of a model that there is not to be is freed. */
@@ -585,11 +610,12 @@ function checkedBox(box: NonNullable<Options['box']>): [Float64Array, number | u
 
 function checked(given: DeformableOptions): Options {
   const known = checkProperties('options', given, OPTIONS);
-  const { frame, levels, finest, edge } = known;
+  const { frame, levels, finest, edge, maxVertices } = known;
   if (frame !== undefined) integer('frame', frame);
   if (levels !== undefined) integer('levels', levels);
   if (finest !== undefined) integer('finest', finest);
   if (edge !== undefined) positive('edge', edge);
+  if (maxVertices !== undefined) integer('maxVertices', maxVertices, { min: 1 });
   return known;
 }
 

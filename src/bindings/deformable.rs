@@ -83,17 +83,35 @@ impl RawDeformable {
     }
 }
 
-/// Returns the options of a model of a volume; properties of `params` replace the default parameters for that volume.
-fn options(
-    volume: &RawVolume,
-    frame: usize,
-    start: RawStart,
-    levels: usize,
-    edge: Option<f64>,
-    params: &JsValue,
-) -> Result<DeformableOptions, Failure> {
-    let params = with_overrides(&DeformableParams::for_volume(&volume.0), params)?;
-    Ok(DeformableOptions { frame, start: start.0, levels, edge, params: Some(params) })
+/// The options of a model of a volume, and of its creation.
+#[wasm_bindgen]
+pub struct RawDeformableOptions(DeformableOptions);
+
+#[wasm_bindgen]
+impl RawDeformableOptions {
+    /// Creates options by default; properties of `params` replace the default parameters for `volume`.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        volume: &RawVolume,
+        start: RawStart,
+        params: &JsValue,
+    ) -> Result<RawDeformableOptions, JsValue> {
+        let params = Some(with_overrides(&DeformableParams::for_volume(&volume.0), params)?);
+        Ok(RawDeformableOptions(DeformableOptions { start: start.0, params, ..Default::default() }))
+    }
+
+    /// Sets the frame, and the number of pyramid levels.
+    #[wasm_bindgen(js_name = setFrame)]
+    pub fn set_frame(&mut self, frame: usize, levels: usize) {
+        (self.0.frame, self.0.levels) = (frame, levels);
+    }
+
+    /// Sets the target edge length on the finest level, in world units, derived from the volume if not given, and the
+    /// largest number of vertices.
+    #[wasm_bindgen(js_name = setSize)]
+    pub fn set_size(&mut self, edge: Option<f64>, max_vertices: Option<usize>) {
+        (self.0.edge, self.0.max_vertices) = (edge, max_vertices);
+    }
 }
 
 /// A model that is being created in slices.
@@ -104,16 +122,8 @@ pub struct RawDeformableCreation(pub(super) Computation<Result<DeformableModel, 
 impl RawDeformableCreation {
     /// Begins to create the model that the constructor of `RawDeformable` creates.
     #[wasm_bindgen(constructor)]
-    pub fn new(
-        volume: &RawVolume,
-        frame: usize,
-        start: RawStart,
-        levels: usize,
-        edge: Option<f64>,
-        params: &JsValue,
-    ) -> Result<RawDeformableCreation, JsValue> {
-        let options = options(volume, frame, start, levels, edge, params)?;
-        let creation = DeformableModel::begin(&volume.0, options).map_err(Failure::from)?;
+    pub fn new(volume: &RawVolume, options: RawDeformableOptions) -> Result<RawDeformableCreation, JsValue> {
+        let creation = DeformableModel::begin(&volume.0, options.0).map_err(Failure::from)?;
         Ok(RawDeformableCreation(Box::pin(creation)))
     }
 
@@ -130,20 +140,10 @@ method_bindings!(RawDeformable, DeformableModel, deformableParamSpecs);
 
 #[wasm_bindgen]
 impl RawDeformable {
-    /// Creates a deformable model of one frame of a volume, with a pyramid of `levels` levels. `edge` is the target
-    /// edge length on the finest level, in world units, derived from the volume if not given; properties of `params`
-    /// replace the default parameters for that volume.
+    /// Creates a deformable model of one frame of a volume.
     #[wasm_bindgen(constructor)]
-    pub fn new(
-        volume: &RawVolume,
-        frame: usize,
-        start: RawStart,
-        levels: usize,
-        edge: Option<f64>,
-        params: &JsValue,
-    ) -> Result<RawDeformable, JsValue> {
-        let options = options(volume, frame, start, levels, edge, params)?;
-        let model = DeformableModel::new(&volume.0, options).map_err(Failure::from)?;
+    pub fn new(volume: &RawVolume, options: RawDeformableOptions) -> Result<RawDeformable, JsValue> {
+        let model = DeformableModel::new(&volume.0, options.0).map_err(Failure::from)?;
         Ok(RawDeformable(Stepping::new(model)))
     }
 

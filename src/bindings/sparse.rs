@@ -94,26 +94,54 @@ impl RawSparseVolume {
     }
 }
 
+/// The options of a model of a sparse volume, and of its creation.
+#[wasm_bindgen]
+pub struct RawSparseOptions(SparseOptions);
+
+#[wasm_bindgen]
+impl RawSparseOptions {
+    /// Creates options by default; properties of `params` replace the default parameters for the range of `volume`.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        volume: &RawSparseVolume,
+        start: RawStart,
+        params: &JsValue,
+    ) -> Result<RawSparseOptions, JsValue> {
+        let params = Some(with_overrides(&DeformableParams::for_range(volume.0.range()), params)?);
+        Ok(RawSparseOptions(SparseOptions { start: start.0, params, ..Default::default() }))
+    }
+
+    /// Sets the level at which the run ends. With `within`, the two corners of a box in world space, levels finer than
+    /// `whole` are followed only inside of it.
+    #[wasm_bindgen(js_name = setLevels)]
+    pub fn set_levels(
+        &mut self,
+        finest: usize,
+        whole: Option<usize>,
+        within: Option<Float64Array>,
+    ) -> Result<(), JsValue> {
+        self.0.within = within.map(|corners| world_box(&corners)).transpose()?;
+        (self.0.finest, self.0.whole) = (finest, whole);
+        Ok(())
+    }
+
+    /// Sets what `setSize` sets for volumes in memory; the finest level is that at which the run ends.
+    #[wasm_bindgen(js_name = setSize)]
+    pub fn set_size(&mut self, edge: Option<f64>, max_vertices: Option<usize>) {
+        (self.0.edge, self.0.max_vertices) = (edge, max_vertices);
+    }
+}
+
 #[wasm_bindgen]
 impl RawDeformable {
     /// Creates a deformable model of a sparse volume, whose coarsest level must be loaded, else the failure is
-    /// `needs-data`. The run ends on level `finest`. With `within`, the two corners of a box in world space, levels finer
-    /// than `whole` are followed only inside of it. `edge` and `params` are as for other volumes.
+    /// `needs-data`.
     ///
     /// A step of it either makes an iteration, or changes nothing and returns `{ needs }`: an array of `{ level, min,
     /// dims }`, the boxes to insert into the volume before the next call.
     #[wasm_bindgen(js_name = newSparse)]
-    pub fn new_sparse(
-        volume: &RawSparseVolume,
-        start: RawStart,
-        finest: usize,
-        edge: Option<f64>,
-        whole: Option<usize>,
-        within: Option<Float64Array>,
-        params: &JsValue,
-    ) -> Result<RawDeformable, JsValue> {
-        let options = options(volume, start, finest, edge, whole, within, params)?;
-        let model = DeformableModel::on_sparse(&volume.0, options).map_err(Failure::from)?;
+    pub fn new_sparse(volume: &RawSparseVolume, options: RawSparseOptions) -> Result<RawDeformable, JsValue> {
+        let model = DeformableModel::on_sparse(&volume.0, options.0).map_err(Failure::from)?;
         Ok(RawDeformable(Stepping::new(model)))
     }
 }
@@ -124,31 +152,11 @@ impl RawDeformableCreation {
     #[wasm_bindgen(js_name = newSparse)]
     pub fn new_sparse(
         volume: &RawSparseVolume,
-        start: RawStart,
-        finest: usize,
-        edge: Option<f64>,
-        whole: Option<usize>,
-        within: Option<Float64Array>,
-        params: &JsValue,
+        options: RawSparseOptions,
     ) -> Result<RawDeformableCreation, JsValue> {
-        let options = options(volume, start, finest, edge, whole, within, params)?;
-        let creation = DeformableModel::begin_on_sparse(&volume.0, options).map_err(Failure::from)?;
+        let creation = DeformableModel::begin_on_sparse(&volume.0, options.0).map_err(Failure::from)?;
         Ok(RawDeformableCreation(std::boxed::Box::pin(creation)))
     }
-}
-
-fn options(
-    volume: &RawSparseVolume,
-    start: RawStart,
-    finest: usize,
-    edge: Option<f64>,
-    whole: Option<usize>,
-    within: Option<Float64Array>,
-    params: &JsValue,
-) -> Result<SparseOptions, Failure> {
-    let params = Some(with_overrides(&DeformableParams::for_range(volume.0.range()), params)?);
-    let within = within.map(|corners| world_box(&corners)).transpose()?;
-    Ok(SparseOptions { start: start.0, finest, edge, params, within, whole })
 }
 
 fn world_box(corners: &Float64Array) -> Result<WorldBox, Failure> {

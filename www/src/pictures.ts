@@ -1,13 +1,14 @@
 /** How large pictures are before they are decoded: a few kilobytes can stand for gigabytes of equal pixels. */
+import { areSmall, SMALL } from './small-files';
 import { text } from './texts';
 
-/** Bytes of files that are small, all together, and the most pixels that their pictures may have. */
-const [SMALL, MOST_OF_SMALL] = [2 ** 17, 2 ** 24];
+/** The most pixels that pictures in small files may have. */
+const MOST_OF_SMALL = 2 ** 24;
 
 /** Throws if pictures in small files would have too many pixels. One that is used several times is counted as often. */
 export async function checkPictures(uses: readonly Blob[]): Promise<void> {
   const files = [...new Set(uses)];
-  if (files.reduce((sum, { size }) => sum + size, 0) > SMALL) return;
+  if (!areSmall(files)) return;
   const pixels = new Map<Blob, number>();
   for (const file of files) pixels.set(file, await pixelsOf(file));
   const total = uses.reduce((sum, file) => sum + (pixels.get(file) ?? 0), 0);

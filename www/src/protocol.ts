@@ -272,7 +272,15 @@ export interface Requests extends CodeRequests {
    * model stay.
    */
   load: {
-    body: { name: string; source: ImageSource; setup: Setup; frame: number; saved?: SavedRun | undefined };
+    body: {
+      name: string;
+      source: ImageSource;
+      setup: Setup;
+      frame: number;
+      saved?: SavedRun | undefined;
+      /** Most vertices that surfaces of this image may have. */
+      maxVertices?: number | undefined;
+    };
     reply: Loaded;
   };
   /** Ends the opening of a volume larger than memory, if one is being opened, since another is to be opened. */

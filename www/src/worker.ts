@@ -59,12 +59,21 @@ const MOST_REPORTS = 50;
 /** The contents of a snapshot besides the surface: none, its measures, or measures and mesh checks. */
 type Detail = 'plain' | 'measured' | 'checked';
 
+/** An open volume, and the most vertices of its surfaces. */
+interface Image {
+  volume?: Volume;
+  large?: LargeVolume;
+  maxVertices: number | undefined;
+}
+
 const send = sender<WorkerEvent>();
 
 class Session {
   /** The open volume; of one larger than memory, `#large`, only parts are read. */
   #volume: Volume | undefined;
   #large: LargeVolume | undefined;
+  /** Most vertices of surfaces of the volume; undefined if the library's own limit applies. */
+  #maxVertices: number | undefined;
   /** Origin of the volume, for the code of a run. */
   #origin: RunData | undefined;
   #model: DeformableModel | undefined;
@@ -121,18 +130,19 @@ class Session {
     if (this.#free.length < BUFFER_SETS) this.#free.push(buffers);
   }
 
-  async #load({ name, source, setup, frame, saved }: Requests['load']['body'], signal: AbortSignal): Promise<Loaded> {
+  async #load(body: Requests['load']['body'], signal: AbortSignal): Promise<Loaded> {
     await this.#pause();
-    if ('zarr' in source) return this.#loadLarge(name, source, setup, signal);
+    const { name, source, setup, frame, saved, maxVertices } = body;
+    if ('zarr' in source) return this.#loadLarge(source, body, signal);
     const { volume, frames, unit, voxels } = await openFrame(source, frame);
     try {
       const view: VolumeView = { ...viewOf(volume, name, voxels), ...displayOf(source), frames, ...(unit && { unit }) };
       const fitting = fittingSetup(setup, volume);
-      const model = saved ? restoredModel(volume, saved) : buildModel(volume, fitting);
+      const model = saved ? restoredModel(volume, saved, maxVertices) : buildModel(volume, fitting, maxVertices);
       // No checks of a new model: the page starts the run at once, and would not show their result.
       const ready = this.#replaceModel(model, fitting, saved ? 'checked' : 'measured');
       if (saved) this.#continue(saved);
-      this.#keep({ volume });
+      this.#keep({ volume, maxVertices });
       const files = 'files' in source ? source.files.map(({ name, notes }) => ({ name, notes })) : [];
       this.#origin = { files, frame: frames > 1 ? frame : undefined, volume };
       this.#window = view.window;
@@ -147,14 +157,18 @@ class Session {
     }
   }
 
-  async #loadLarge(name: string, source: LargeSource, setup: Setup, signal: AbortSignal): Promise<Loaded> {
+  async #loadLarge(
+    source: LargeSource,
+    { name, setup, maxVertices }: Requests['load']['body'],
+    signal: AbortSignal,
+  ): Promise<Loaded> {
     const { LargeVolume } = await import('./worker/large');
     const large = await LargeVolume.open(source, signal);
     try {
       const view = large.view(name);
       const fitting = { ...setup, levels: Math.min(setup.levels, large.coarserLevels) };
-      const ready = this.#replaceModel(large.model(fitting), fitting, 'measured');
-      this.#keep({ large });
+      const ready = this.#replaceModel(large.model(fitting, maxVertices), fitting, 'measured');
+      this.#keep({ large, maxVertices });
       this.#origin = { source, name, coarserLevels: large.coarserLevels };
       return withTransfer({ ...ready, volume: view, levels: fitting.levels }, [view.voxels]);
     } catch (error) {
@@ -164,16 +178,18 @@ class Session {
   }
 
   /** Makes a volume the open one, and frees the one before. */
-  #keep({ volume, large }: { volume?: Volume; large?: LargeVolume }): void {
+  #keep({ volume, large, maxVertices }: Image): void {
     this.#volume?.free();
     this.#large?.free();
     this.#volume = volume;
     this.#large = large;
+    this.#maxVertices = maxVertices;
     this.#data = undefined;
   }
 
   #build(setup: Setup): DeformableModel {
-    return this.#large ? this.#large.model(setup) : buildModel(this.#image(), setup);
+    const most = this.#maxVertices;
+    return this.#large ? this.#large.model(setup, most) : buildModel(this.#image(), setup, most);
   }
 
   async #rebuild(setup: Setup): Promise<Ready> {
@@ -337,7 +353,7 @@ class Session {
   async #restore(saved: SavedRun): Promise<Ready> {
     await this.#pause();
     if (saved.levels === this.#levels) this.#current().restore(saved.state);
-    else this.#replaceBy(restoredModel(this.#image(), saved));
+    else this.#replaceBy(restoredModel(this.#image(), saved, this.#maxVertices));
     const model = this.#current();
     this.#continue(saved);
     this.#reportStopped();
@@ -363,7 +379,7 @@ class Session {
     await this.#pause();
     const image = this.#image();
     return this.#comparison.begin((signal) =>
-      compare(image, setup, signal, (run, report) => send({ event: 'comparing', run, report })),
+      compare(image, setup, this.#maxVertices, signal, (run, report) => send({ event: 'comparing', run, report })),
     );
   }
 

@@ -6,7 +6,7 @@
 //! where the volumes differ, they move by the same distance everywhere; what rigidity has evened out stays so.
 
 use super::DeformableModel;
-use super::contour::{ObjectIs, contour_of_grid, placed};
+use super::contour::{contour_of_grid, placed};
 use crate::math::{Bounds, Vec3};
 use crate::mesh::{TriangleMesh, VertexId, measure, sort_distinct};
 use crate::methods::MethodError;
@@ -123,8 +123,7 @@ impl DeformableModel {
         let region = Region { min, dims: [0, 1, 2].map(|axis| end[axis] - min[axis]) };
         let offset = Vec3::from(min.map(|k| k as f32));
         let part = grid.region(region)?.into();
-        let object = ObjectIs::by(&self.params);
-        let surface = contour_of_grid(&Subdivided::whole(&part), self.level_iso, object)?;
+        let surface = contour_of_grid(&Subdivided::whole(&part), self.contour_rule(self.level_iso))?;
         Ok(placed(surface, |p| position(p + offset)))
     }
 }

@@ -14,9 +14,11 @@ use crate::volume::{
 };
 use std::borrow::Cow;
 
-/// The largest number of triangles of a contour: a model of more would need more memory than a page has. Noise without
-/// an object has as many.
-const MOST_TRIANGLES: usize = 6_000_000;
+/// The number of triangles that a contour may have whatever its image, and the number for each voxel, or each part of
+/// elongated voxels, that it may have beyond that: noise and lattices have more, bone with pores as wide as five voxels
+/// has half as many. A kilobyte can stand for a lattice of any size.
+const ALWAYS: usize = 1_600_000;
+const TRIANGLES_PER_VOXEL: f64 = 0.5;
 
 /// The least δ, in voxels of the pyramid level, for which a contour is simplified by merging clusters of vertices; for
 /// finer meshes, clusters as large as a voxel are too coarse.
@@ -80,18 +82,30 @@ impl ObjectIs {
 /// if those of that size count; larger limits of the size would change which parts of other images are noise.
 pub(super) const SMALL_PART: f64 = 8.0;
 
-/// Extracts the iso-surface of a pyramid level in model space, closed and facing away from the object. Closed parts, of
-/// the object or around cavities, that enclose less than `smallest_part`, in model units, are left out; if
-/// none remains, the mesh is empty.
+/// What a contour is extracted from a pyramid level by.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ContourRule {
+    pub(super) iso: f32,
+    pub(super) object: ObjectIs,
+    /// The least volume of a closed part, of the object or around a cavity, in model units; smaller ones are left out.
+    pub(super) smallest_part: f64,
+    /// The largest number of triangles; fewer in small images, see [`ALWAYS`].
+    pub(super) most: usize,
+}
+
+/// Extracts the iso-surface of a pyramid level in model space, closed and facing away from the object; the mesh is empty
+/// if no part remains.
+///
+/// # Errors
+/// [`VolumeError::TooManyTriangles`]; if memory does not suffice.
 pub(super) async fn contour(
     image: &LevelImage,
-    iso: f32,
-    object: ObjectIs,
-    smallest_part: f64,
+    rule: ContourRule,
     pauses: &Pauses,
 ) -> Result<TriangleMesh, MethodError> {
+    let smallest_part = rule.smallest_part;
     let (grid, position) = image.part_grid();
-    let surface = contour_in_slices(&grid, iso, object, pauses).await?;
+    let surface = contour_in_slices(&grid, rule, pauses).await?;
     pauses.now().await;
     if smallest_part > SMALL_PART {
         return Ok(placed(surface, position).without_components_below(smallest_part));
@@ -138,25 +152,23 @@ fn voxels_in(surface: &TriangleMesh, triangles: &[[u32; 3]]) -> usize {
     voxels_inside(&part, dims).count_ones(..)
 }
 
-/// Extracts the iso-surface of a grid in indices of the parts of its voxels, closed and facing away from the object.
-pub(super) fn contour_of_grid(
-    grid: &Subdivided,
-    iso: f32,
-    object: ObjectIs,
-) -> Result<TriangleMesh, MethodError> {
-    finished(contour_in_slices(grid, iso, object, &Pauses::default()))
+/// Extracts the iso-surface of a grid in indices of the parts of its voxels, closed and facing away from the object, with
+/// all of its parts.
+pub(super) fn contour_of_grid(grid: &Subdivided, rule: ContourRule) -> Result<TriangleMesh, MethodError> {
+    finished(contour_in_slices(grid, rule, &Pauses::default()))
 }
 
 /// Does what [`contour_of_grid`] does, and pauses meanwhile.
 pub(super) async fn contour_in_slices(
     grid: &Subdivided<'_>,
-    iso: f32,
-    object: ObjectIs,
+    ContourRule { iso, object, most, .. }: ContourRule,
     pauses: &Pauses,
 ) -> Result<TriangleMesh, MethodError> {
+    let voxels = grid.dims().map(|n| n as f64).iter().product::<f64>();
+    let most = most.min(ALWAYS.max((TRIANGLES_PER_VOXEL * voxels) as usize));
     Ok(match object {
-        ObjectIs::Brighter => marching_cubes_in_slices(grid, iso, MOST_TRIANGLES, pauses).await?,
-        ObjectIs::Darker => marching_cubes_in_slices(&Negated(grid), -iso, MOST_TRIANGLES, pauses).await?,
+        ObjectIs::Brighter => marching_cubes_in_slices(grid, iso, most, pauses).await?,
+        ObjectIs::Darker => marching_cubes_in_slices(&Negated(grid), -iso, most, pauses).await?,
     })
 }
 

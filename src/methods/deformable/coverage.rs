@@ -2,7 +2,7 @@
 //! model lacks.
 
 use super::DeformableModel;
-use super::contour::{ObjectIs, contour};
+use super::contour::{ContourRule, contour};
 use super::image::LevelImage;
 use crate::math::order::{rank_f64, sort_by_rank};
 use crate::math::{DAffine3, DVec3, Vec3, triangle};
@@ -85,28 +85,28 @@ impl CoverageSurvey {
     }
 }
 
-/// The surface whose coverage is measured, and the image whose iso-surface it is compared with.
+/// The surface whose coverage is measured, and the image with whose iso-surface it is compared.
 struct Measured {
     image: LevelImage,
-    iso: f32,
-    object: ObjectIs,
-    smallest_part: f64,
+    rule: ContourRule,
     model: TriangleMesh,
     to_world: DAffine3,
 }
 
-/// The two surfaces, and what has been found of them.
-struct Comparison {
+/// The tests of the triangles of both surfaces, with their progress.
+struct Tests<'a> {
     to_world: DAffine3,
-    iso_surface: TriangleMesh,
-    iso_tree: TriangleTree,
-    model: TriangleMesh,
-    model_tree: TriangleTree,
-    /// By triangle of the iso-surface, for those tested so far: whether all of it is within one voxel of the model.
-    is_covered: Vec<bool>,
-    /// Covered area and total area of the triangles tested so far, in square world units, of the iso-surface and of the
-    /// model.
-    areas: [[f64; 2]; 2],
+    count: usize,
+    done: usize,
+    share: &'a Cell<f64>,
+}
+
+/// What was found of the triangles of a surface.
+struct Covered {
+    /// By triangle: whether all of it is within one voxel of the other surface.
+    triangles: Vec<bool>,
+    /// The share of the area that is.
+    share: f64,
 }
 
 impl DeformableModel {
@@ -133,9 +133,7 @@ impl DeformableModel {
         self.check_is_whole()?;
         Ok(Measured {
             image: self.pyramid.levels[0].clone(),
-            iso: self.pyramid.iso(&self.params),
-            object: ObjectIs::by(&self.params),
-            smallest_part: self.smallest_part(),
+            rule: self.contour_rule(self.pyramid.iso(&self.params)),
             model: self.mesh.to_triangles(),
             to_world: self.to_world,
         })
@@ -144,113 +142,108 @@ impl DeformableModel {
 
 impl Measured {
     async fn coverage(self, share: &Cell<f64>, pauses: &Pauses) -> Result<Coverage, MethodError> {
-        let Self { image, iso, object, smallest_part, model, to_world } = self;
-        let iso_surface = contour(&image, iso, object, smallest_part, pauses).await?;
+        let Self { image, rule, model, to_world } = self;
+        let iso_surface = contour(&image, rule, pauses).await?;
         drop(image);
         pauses.now().await;
-        let mut comparison = Comparison {
-            to_world,
-            iso_tree: TriangleTree::in_slices(&iso_surface, pauses).await?,
-            model_tree: TriangleTree::in_slices(&model, pauses).await?,
-            is_covered: Vec::with_capacity(iso_surface.triangles.len()),
-            iso_surface,
-            model,
-            areas: [[0.0; 2]; 2],
+        let count = model.triangles.len() + iso_surface.triangles.len();
+        let mut tests = Tests { to_world, count, done: 0, share };
+        let precision = {
+            // One tree at a time: each takes as much memory as both surfaces.
+            let iso_tree = TriangleTree::in_slices(&iso_surface, pauses).await?;
+            tests.test(&model, &iso_tree, pauses).await.share
         };
-        comparison.test_all(share, pauses).await;
-        let share_of = |[covered, whole]: [f64; 2]| if whole > 0.0 { covered / whole } else { 1.0 };
-        let [recall, precision] = comparison.areas.map(share_of);
-        Ok(Coverage { recall, precision, uncovered: comparison.uncovered_regions(pauses).await })
+        let model_tree = TriangleTree::in_slices(&model, pauses).await?;
+        let covered = tests.test(&iso_surface, &model_tree, pauses).await;
+        share.set(1.0);
+        let is_inside = |p| is_inside(&model, &model_tree, p);
+        let uncovered =
+            uncovered_regions(iso_surface, &covered.triangles, &to_world, is_inside, pauses).await;
+        Ok(Coverage { recall: covered.share, precision, uncovered })
     }
 }
 
-impl Comparison {
-    async fn test_all(&mut self, share: &Cell<f64>, pauses: &Pauses) {
-        let [of_iso, of_model] = [&self.iso_surface, &self.model].map(|mesh| mesh.triangles.len());
-        for t in 0..of_iso + of_model {
-            if t < of_iso {
-                let covered = self.test(0, t);
-                self.is_covered.push(covered);
-            } else {
-                self.test(1, t - of_iso);
-            }
-            share.set((t + 1) as f64 / (of_iso + of_model) as f64);
+impl Tests<'_> {
+    /// Tests the triangles of `surface` piece by piece; `other` is the tree of the other surface.
+    async fn test(&mut self, surface: &TriangleMesh, other: &TriangleTree, pauses: &Pauses) -> Covered {
+        let mut triangles = Vec::with_capacity(surface.triangles.len());
+        let [mut covered_area, mut whole_area] = [0.0; 2];
+        for corners in surface.corners() {
+            let (mut covered, mut count) = (0u32, 0u32);
+            for_each_piece(corners, |middle| {
+                count += 1;
+                covered += u32::from(other.is_within(middle, COVERED_DISTANCE));
+            });
+            let in_world = corners.map(|p| self.to_world.transform_vector3(p.as_dvec3()));
+            let area = 0.5 * (in_world[1] - in_world[0]).cross(in_world[2] - in_world[0]).length();
+            covered_area += area * f64::from(covered) / f64::from(count);
+            whole_area += area;
+            triangles.push(covered == count);
+            self.done += 1;
+            self.share.set(self.done as f64 / self.count as f64);
             pauses.after(1).await;
         }
-        share.set(1.0);
+        let share = if whole_area > 0.0 { covered_area / whole_area } else { 1.0 };
+        Covered { triangles, share }
     }
+}
 
-    /// Tests triangle `t` of the iso-surface (`which` 0) or of the model (1) piece by piece, adds its covered and total
-    /// area to the sums, and returns whether all of its pieces are within one voxel of the other surface.
-    fn test(&mut self, which: usize, t: usize) -> bool {
-        let (mesh, other) = [(&self.iso_surface, &self.model_tree), (&self.model, &self.iso_tree)][which];
-        let corners = mesh.triangles[t].map(|v| mesh.positions[v as usize]);
-        let (mut covered, mut count) = (0u32, 0u32);
-        for_each_piece(corners, |middle| {
-            count += 1;
-            covered += u32::from(other.is_within(middle, COVERED_DISTANCE));
-        });
-        let in_world = corners.map(|p| self.to_world.transform_vector3(p.as_dvec3()));
-        let area = 0.5 * (in_world[1] - in_world[0]).cross(in_world[2] - in_world[0]).length();
-        let [covered_area, whole_area] = &mut self.areas[which];
-        *covered_area += area * f64::from(covered) / f64::from(count);
-        *whole_area += area;
-        covered == count
+/// Returns the connected parts of the iso-surface that consist of its triangles that are not covered.
+async fn uncovered_regions(
+    mut surface: TriangleMesh,
+    is_covered: &[bool],
+    to_world: &DAffine3,
+    is_inside: impl Fn(Vec3) -> bool,
+    pauses: &Pauses,
+) -> Vec<UncoveredRegion> {
+    let mut covered = is_covered.iter();
+    surface.triangles.retain(|_| covered.next() == Some(&false));
+    pauses.now().await;
+    let component = surface.component_of_each_vertex();
+    let mut components: Vec<u32> = surface.triangles.iter().map(|t| component[t[0] as usize]).collect();
+    components.sort_unstable();
+    components.dedup();
+    pauses.now().await;
+    let part = |t: usize| components.partition_point(|&c| c < component[surface.triangles[t][0] as usize]);
+    let area_and_middle = |corners: [Vec3; 3]| {
+        let [a, b, c] = corners.map(|p| to_world.transform_point3(p.as_dvec3()));
+        (0.5 * (b - a).cross(c - a).length(), (a + b + c) / 3.0)
+    };
+    let mut sums = vec![(DVec3::ZERO, 0.0); components.len()];
+    for (t, corners) in surface.corners().enumerate() {
+        let (area, middle) = area_and_middle(corners);
+        let (sum, total) = &mut sums[part(t)];
+        *sum += middle * area;
+        *total += area;
+        pauses.after(1).await;
     }
+    let mut nearest = vec![(f64::INFINITY, Vec3::ZERO, DVec3::ZERO); components.len()];
+    for (t, corners) in surface.corners().enumerate() {
+        let (sum, total) = sums[part(t)];
+        let (_, middle) = area_and_middle(corners);
+        let distance = middle.distance_squared(sum / total);
+        if distance < nearest[part(t)].0 {
+            let [a, b, c] = corners;
+            nearest[part(t)] = (distance, (a + b + c) / 3.0, middle);
+        }
+        pauses.after(1).await;
+    }
+    let mut regions = Vec::new();
+    for ((_, local, position), (_, area)) in nearest.into_iter().zip(sums) {
+        let kind = if is_inside(local) { Missing::Cavity } else { Missing::Matter };
+        regions.push(UncoveredRegion { position, area, kind });
+        pauses.after(1).await;
+    }
+    sort_by_rank(&mut regions, |region: &UncoveredRegion| !rank_f64(region.area));
+    regions
+}
 
-    async fn uncovered_regions(&self, pauses: &Pauses) -> Vec<UncoveredRegion> {
-        let uncovered =
-            self.iso_surface.triangles.iter().zip(&self.is_covered).filter(|(_, covered)| !**covered);
-        let rest = TriangleMesh {
-            positions: self.iso_surface.positions.clone(),
-            triangles: uncovered.map(|(triangle, _)| *triangle).collect(),
-            ..TriangleMesh::default()
-        };
-        pauses.now().await;
-        let part_of = rest.component_of_each_vertex();
-        pauses.now().await;
-        let mut sums = vec![(DVec3::ZERO, 0.0); rest.positions.len()];
-        let area_and_middle = |corners: [Vec3; 3]| {
-            let [a, b, c] = corners.map(|p| self.to_world.transform_point3(p.as_dvec3()));
-            (0.5 * (b - a).cross(c - a).length(), (a + b + c) / 3.0)
-        };
-        for (t, corners) in rest.corners().enumerate() {
-            let (area, middle) = area_and_middle(corners);
-            let (sum, total) = &mut sums[part_of[rest.triangles[t][0] as usize] as usize];
-            *sum += middle * area;
-            *total += area;
-        }
-        pauses.now().await;
-        let mut nearest: Vec<Option<(f64, Vec3, DVec3)>> = vec![None; sums.len()];
-        for (t, corners) in rest.corners().enumerate() {
-            let part = part_of[rest.triangles[t][0] as usize] as usize;
-            let (sum, total) = sums[part];
-            let (_, middle) = area_and_middle(corners);
-            let distance = middle.distance_squared(sum / total);
-            if nearest[part].is_none_or(|(least, ..)| distance < least) {
-                let [a, b, c] = corners;
-                nearest[part] = Some((distance, (a + b + c) / 3.0, middle));
-            }
-        }
-        pauses.now().await;
-        let mut parts = Vec::new();
-        for (nearest, (_, area)) in nearest.into_iter().zip(&sums) {
-            let Some((_, local, position)) = nearest else { continue };
-            let kind = if self.is_inside_model(local) { Missing::Cavity } else { Missing::Matter };
-            parts.push(UncoveredRegion { position, area: *area, kind });
-            pauses.after(1).await;
-        }
-        sort_by_rank(&mut parts, |part: &UncoveredRegion| !rank_f64(part.area));
-        parts
-    }
-
-    fn is_inside_model(&self, p: Vec3) -> bool {
-        self.model_tree.ray_hit(p, RAY).is_some_and(|hit| {
-            let corners =
-                self.model.triangles[hit.triangle as usize].map(|v| self.model.positions[v as usize]);
-            triangle::area_vector(corners).dot(RAY.as_dvec3()) > 0.0
-        })
-    }
+/// Returns whether a point is inside the model's surface.
+fn is_inside(model: &TriangleMesh, tree: &TriangleTree, p: Vec3) -> bool {
+    tree.ray_hit(p, RAY).is_some_and(|hit| {
+        let corners = model.triangles[hit.triangle as usize].map(|v| model.positions[v as usize]);
+        triangle::area_vector(corners).dot(RAY.as_dvec3()) > 0.0
+    })
 }
 
 /// Calls `visit` with the centroids of equal pieces of a triangle, from which its covered share is estimated. Sides of

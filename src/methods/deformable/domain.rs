@@ -18,7 +18,15 @@ const MAX_ELONGATION: f32 = 6.0;
 
 /// The largest number of vertices of the surface of a deformable model, whatever its image. A vertex takes about 200
 /// bytes, meshes are copied several times, and wasm32 has 4 GiB.
-const MAX_VERTICES: f64 = 4e6;
+const MAX_VERTICES: usize = 4_000_000;
+
+/// The largest number of triangles of a contour: a model of more would need more memory than a page has. Noise without
+/// an object has as many.
+const MOST_TRIANGLES: usize = 6_000_000;
+
+/// The largest number of triangles of a contour for each vertex that the surface may have: bringing its edges within
+/// bounds removes half of its vertices or more.
+const TRIANGLES_PER_VERTEX: usize = 4;
 
 /// A box around the image in model space, in which all vertices must stay, with the rounded box that it is made from.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +36,8 @@ pub(super) struct Domain {
     /// if no object is found to enclose.
     pub(super) axes: Vec3,
     pub(super) bounds: Bounds,
+    /// The largest number of vertices of the surface, whatever its edges.
+    pub(super) max_vertices: usize,
 }
 
 /// The least half axis of a rounded box, in δ, the lower edge bound: a smaller one is not round with these edges.
@@ -61,7 +71,18 @@ impl Domain {
             centre,
             axes,
             bounds: Bounds { min: centre - axes * DOMAIN_SCALE, max: centre + axes * DOMAIN_SCALE },
+            max_vertices: MAX_VERTICES,
         }
+    }
+
+    /// Returns the domain with at most `most` vertices of a surface in it.
+    pub(super) fn with_at_most(self, most: usize) -> Self {
+        Self { max_vertices: most.min(MAX_VERTICES), ..self }
+    }
+
+    /// Returns the largest number of triangles of a contour.
+    pub(super) fn most_triangles(&self) -> usize {
+        self.max_vertices.saturating_mul(TRIANGLES_PER_VERTEX).min(MOST_TRIANGLES)
     }
 
     /// Returns the approximate number of vertices of the enclosing start surface for the lower edge bound `delta`, δ,
@@ -77,9 +98,9 @@ impl Domain {
     }
 
     /// Returns the largest number of vertices, for the lower edge bound `delta`, δ, of a surface in the domain without
-    /// unresolved contacts: one per cube of side δ, but at most [`MAX_VERTICES`].
+    /// unresolved contacts: one per cube of side δ, but at most [`Self::max_vertices`].
     pub(super) fn most_vertices(&self, delta: f32) -> usize {
         let cubes = ((self.bounds.max - self.bounds.min) / delta).as_dvec3().element_product();
-        if cubes < MAX_VERTICES { cubes as usize } else { MAX_VERTICES as usize }
+        (cubes as usize).min(self.max_vertices)
     }
 }

@@ -91,6 +91,7 @@ use crate::pauses::{Pauses, finished};
 use crate::remesh::{Changes, Resolver, Sampling};
 use crate::volume::Volume;
 use checkpoint::{Checkpoint, Progress};
+use contour::{ContourRule, ObjectIs};
 use domain::Domain;
 use forces::{Field, ForceScale, LocalAttractor};
 use image::Pyramid;
@@ -118,11 +119,14 @@ pub struct DeformableOptions {
     pub edge: Option<f64>,
     /// The parameters of the model; by default [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
+    /// The largest number of vertices of the surface, by default four million. A contour that it starts from has at most
+    /// four times as many triangles.
+    pub max_vertices: Option<usize>,
 }
 
 impl Default for DeformableOptions {
     fn default() -> Self {
-        Self { frame: 0, start: Start::Contour, levels: 0, edge: None, params: None }
+        Self { frame: 0, start: Start::Contour, levels: 0, edge: None, params: None, max_vertices: None }
     }
 }
 
@@ -211,6 +215,7 @@ struct Origin {
     start: Start,
     edge: Option<f64>,
     params: DeformableParams,
+    max_vertices: Option<usize>,
 }
 
 /// A closed mesh that evolves in an image under internal and external forces and changes its topology automatically.
@@ -299,13 +304,14 @@ impl DeformableModel {
     ) -> Result<impl Future<Output = Result<Self, MethodError>> + use<>, MethodError> {
         let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
         params.validate()?;
-        let DeformableOptions { frame, start, levels, edge, .. } = options;
+        let DeformableOptions { frame, start, levels, edge, max_vertices, .. } = options;
         let volume = volume.clone();
         Ok(async move {
             let pauses = Pauses::default();
             let pyramid = Pyramid::in_slices(&volume, frame, levels, &params, &pauses).await?;
             let affine = volume.affine();
-            Self::from_pyramid(pyramid, affine, Origin { frame, start, edge, params }, &pauses).await
+            let origin = Origin { frame, start, edge, params, max_vertices };
+            Self::from_pyramid(pyramid, affine, origin, &pauses).await
         })
     }
 
@@ -321,13 +327,13 @@ impl DeformableModel {
         origin: Origin,
         pauses: &Pauses,
     ) -> Result<Self, MethodError> {
-        let Origin { frame, start, edge, params } = origin;
+        let Origin { frame, start, edge, params, max_vertices } = origin;
         let to_world = pyramid.to_world(&affine);
         let voxel = libm::cbrt(to_world.matrix3.determinant().abs());
         let finest_delta = finest_delta(edge, voxel, pyramid.dims())?;
         let level = pyramid.levels.len() - 1;
         let delta = pyramid.delta_at(finest_delta, level);
-        let domain = Domain::new(pyramid.dims(), delta);
+        let domain = Domain::new(pyramid.dims(), delta).with_at_most(max_vertices.unwrap_or(usize::MAX));
         let context = StartContext::of(&pyramid, &params, domain, delta, &to_world);
         let from_contour = start == Start::Contour;
         let contour = if from_contour { contour_mesh(&context, pauses).await? } else { None };
@@ -531,6 +537,16 @@ impl DeformableModel {
     /// Returns the least volume of a part in model units.
     fn smallest_part(&self) -> f64 {
         self.params.smallest_part * self.pyramid.voxel()
+    }
+
+    /// Returns what contours of the model's image at a normalised intensity are extracted by.
+    fn contour_rule(&self, iso: f32) -> ContourRule {
+        ContourRule {
+            iso,
+            object: ObjectIs::by(&self.params),
+            smallest_part: self.smallest_part(),
+            most: self.domain.most_triangles(),
+        }
     }
 
     fn sampling(&self) -> Sampling {

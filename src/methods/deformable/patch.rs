@@ -5,7 +5,7 @@
 //! already, and each rim of the hole is joined with a rim of the contour by a strip of triangles. If rims do not
 //! correspond, or triangles would intersect, nothing is replaced.
 
-use super::contour::{ObjectIs, contour_of_grid, placed, sizes_of_parts};
+use super::contour::{ContourRule, contour_of_grid, placed, sizes_of_parts};
 use super::image::LevelImage;
 use crate::math::order::{combined_rank, sort_by_rank, sort_distinct, sort_ranks};
 use crate::math::{Bounds, Vec3};
@@ -68,15 +68,6 @@ impl PatchBox {
         let outer = Bounds { min: inner.min - Vec3::splat(GAP), max: inner.max + Vec3::splat(GAP) };
         Self { voxels, inner, outer }
     }
-}
-
-/// The contour to be inserted: the iso value, the side of it on which the object is, and the least volume of a closed
-/// part, in voxels of the finest level.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ContourRule {
-    pub(super) iso: f32,
-    pub(super) object: ObjectIs,
-    pub(super) smallest_part: f64,
 }
 
 /// Part of the mesh, and the surface that replaces it.
@@ -338,8 +329,7 @@ impl Piece {
     fn new(image: &LevelImage, at: PatchBox, rule: ContourRule) -> Result<Self, MethodError> {
         let part = image.part_grid().0.region(at.voxels)?.into();
         let offset = Vec3::from(at.voxels.min.map(|k| k as f32));
-        let mut surface =
-            placed(contour_of_grid(&Subdivided::whole(&part), rule.iso, rule.object)?, |p| p + offset);
+        let mut surface = placed(contour_of_grid(&Subdivided::whole(&part), rule)?, |p| p + offset);
         let component = surface.component_of_each_vertex();
         let sizes = sizes_of_parts(&surface, &component, rule.smallest_part);
         let is_inside: Vec<bool> = surface.positions.iter().map(|&p| at.inner.contains(p)).collect();

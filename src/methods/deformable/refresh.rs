@@ -6,9 +6,8 @@
 //! there wake, and forces and seeding do the same in more iterations.
 
 use super::awake::ITERATIONS_TO_SLEEP;
-use super::contour::ObjectIs;
 use super::image::Pyramid;
-use super::patch::{ContourRule, PatchBox, Replacement, replacement};
+use super::patch::{PatchBox, Replacement, replacement};
 use super::{DeformableModel, Topology};
 use crate::math::{Bounds, Vec3};
 use crate::mesh::VertexId;
@@ -107,11 +106,7 @@ impl DeformableModel {
     fn try_to_patch(&mut self, at: PatchBox) -> Result<Option<usize>, MethodError> {
         let sampling = self.sampling();
         let near = self.resolver.embedding(&self.mesh, sampling).vertices_in(&self.mesh, &at.outer);
-        let rule = ContourRule {
-            iso: self.level_iso,
-            object: ObjectIs::by(&self.params),
-            smallest_part: self.smallest_part(),
-        };
+        let rule = self.contour_rule(self.level_iso);
         let Some(Replacement { removed, patch, components }) =
             replacement(&self.pyramid.levels[0], &self.mesh, &near, at, rule)?
         else {

@@ -6,7 +6,7 @@
 //! components of the mesh that it touches, and is brought within edge bounds like a start; other components are refined
 //! and kept.
 
-use super::contour::{ObjectIs, contour, simplified};
+use super::contour::{contour, simplified};
 use super::{DeformableModel, Topology};
 use crate::mesh::{DisjointSets, Mesh, TriangleMesh, VertexId};
 use crate::methods::MethodError;
@@ -36,10 +36,10 @@ impl DeformableModel {
         if self.params.iso_force == 0.0 || self.params.topology == Topology::Fixed {
             return Ok(Renewal::default());
         }
-        let (level, object) = (self.level - 1, ObjectIs::by(&self.params));
+        let level = self.level - 1;
         let image = &self.pyramid.levels[level];
         let iso = self.pyramid.iso(&self.params);
-        let contour = contour(image, iso, object, self.smallest_part(), pauses).await?;
+        let contour = contour(image, self.contour_rule(iso), pauses).await?;
         pauses.now().await;
         let covered = COVERED_DISTANCE / image.voxels_per_unit();
         let (removed, added) = self.components_to_replace(&contour, covered, pauses).await?;

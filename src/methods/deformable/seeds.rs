@@ -151,7 +151,7 @@ impl DeformableModel {
         let dims = image.part_grid().0.dims();
         let indexed = |mesh| placed(mesh, |p| image.part_index(p));
         // The contour, in a large image the larger of the two meshes, is freed before the other is made.
-        let contour = contour(image, self.level_iso, object, self.smallest_part(), pauses).await?;
+        let contour = contour(image, self.contour_rule(self.level_iso), pauses).await?;
         pauses.now().await;
         let in_contour = voxels_inside(&indexed(contour), dims);
         pauses.now().await;

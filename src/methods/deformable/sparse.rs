@@ -50,11 +50,21 @@ pub struct SparseOptions {
     pub within: Option<WorldBox>,
     /// The finest level that is followed everywhere if there is a box; by default the coarsest.
     pub whole: Option<usize>,
+    /// The largest number of vertices, as in [`super::DeformableOptions::max_vertices`].
+    pub max_vertices: Option<usize>,
 }
 
 impl Default for SparseOptions {
     fn default() -> Self {
-        Self { start: Start::Contour, finest: 0, edge: None, params: None, within: None, whole: None }
+        Self {
+            start: Start::Contour,
+            finest: 0,
+            edge: None,
+            params: None,
+            within: None,
+            whole: None,
+            max_vertices: None,
+        }
     }
 }
 
@@ -185,7 +195,8 @@ impl DeformableModel {
             pauses.now().await;
             let affine = volume.levels()[options.finest].affine;
             let follow = follow(&volume, &options, &pyramid.to_world(&affine))?;
-            let origin = Origin { frame: 0, start: options.start, edge: options.edge, params };
+            let SparseOptions { start, edge, max_vertices, .. } = options;
+            let origin = Origin { frame: 0, start, edge, params, max_vertices };
             let mut model = Self::from_pyramid(pyramid, affine, origin, &pauses).await?;
             model.follow = follow;
             Ok(model)

@@ -1,6 +1,6 @@
 //! Start surfaces (section 3.6): made in model space, with their edges brought within bounds before the first step.
 
-use super::contour::{ObjectIs, contour, contour_in_slices, placed, simplified};
+use super::contour::{ContourRule, ObjectIs, contour, contour_in_slices, placed, simplified};
 use super::domain::{Domain, rounded_axes};
 use super::image::{LevelImage, Pyramid};
 use super::{DeformableModel, DeformableParams, Seeding, coarse, image_guide};
@@ -86,6 +86,11 @@ impl<'a> StartContext<'a> {
             sampling: Sampling::new(delta),
             may_be_empty: params.adapts_to_image() && seeds,
         }
+    }
+
+    fn rule(&self) -> ContourRule {
+        let most = self.domain.most_triangles();
+        ContourRule { iso: self.iso, object: self.object, smallest_part: self.smallest_part, most }
     }
 
     fn most_vertices(&self) -> usize {
@@ -407,7 +412,7 @@ pub(super) async fn contour_mesh(
     context: &StartContext<'_>,
     pauses: &Pauses,
 ) -> Result<Option<Mesh>, MethodError> {
-    let surface = contour(context.image, context.iso, context.object, context.smallest_part, pauses).await?;
+    let surface = contour(context.image, context.rule(), pauses).await?;
     pauses.now().await;
     if surface.triangles.is_empty() {
         return Ok(context.may_be_empty.then(Mesh::default));
@@ -419,7 +424,8 @@ pub(super) async fn contour_mesh(
 
 async fn iso_surface(context: &StartContext<'_>, iso: f32, pauses: &Pauses) -> Result<Mesh, MethodError> {
     let (grid, position) = context.image.part_grid();
-    let surface = contour_in_slices(&grid, iso, ObjectIs::Brighter, pauses).await?;
+    let rule = ContourRule { iso, object: ObjectIs::Brighter, ..context.rule() };
+    let surface = contour_in_slices(&grid, rule, pauses).await?;
     if surface.triangles.is_empty() {
         return Err(MethodError::invalid(
             "start.marchingCubes",

@@ -5,6 +5,7 @@ import type { ImageSource, LargeSource, Loaded, NamedBytes, ParamSpec, ParamValu
 import type { Session } from '../session/file';
 import { contentOf } from '../session/recognise';
 import type { ContentOf } from '../session/schema';
+import { areSmall } from '../small-files';
 import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
@@ -28,6 +29,9 @@ interface OpenedVolume extends Loaded {
   /** The states of the session that is continued. */
   moments?: ExtractMoments | undefined;
 }
+
+/** Most vertices of the surface of an image in small files: with more, the page takes over a gigabyte. */
+const MOST_OF_SMALL = 400_000;
 
 /** Opens volumes in the Extract lab, and builds models of them. */
 export class ExtractOpening extends Opening<Example, Linked, ImageSource, OpenedVolume> {
@@ -124,7 +128,8 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     const { saved, page } = moments?.now ?? {};
     const choice = page?.choice ?? (reopening ? this.#ui.start.inForce : this.#startFor(source, volume));
     const setup = reopening || page ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
-    const body = { name: source.name, source: volume, setup, frame: frameOf(source), saved };
+    const maxVertices = isSmall(source, volume) ? MOST_OF_SMALL : undefined;
+    const body = { name: source.name, source: volume, setup, frame: frameOf(source), saved, maxVertices };
     const loaded = await this.#client.request('load', body, transferable(volume));
     return { ...loaded, choice: { ...choice, levels: loaded.levels }, setup, moments };
   }
@@ -239,6 +244,13 @@ async function momentsOf(session: Session): Promise<ExtractMoments> {
 export function frameOf({ linked, session }: ExtractSource): number {
   const settings = session ? readLink(() => fromHash(session.hash)) : linked;
   return settings instanceof LinkError ? 0 : (settings?.frame ?? 0);
+}
+
+/** Returns whether an image is in small files, or in a small session. */
+function isSmall({ session }: ExtractSource, source: ImageSource): boolean {
+  if (session?.isSmall && session.source.files.every(({ content }) => content)) return true;
+  if ('files' in source) return areSmall(source.files);
+  return 'zarr' in source && source.zarr instanceof Blob && areSmall([source.zarr]);
 }
 
 function transferable(source: ImageSource): Transferable[] {

@@ -2,7 +2,8 @@ import type { Finish } from '../finish';
 import { anyForeign, noted } from '../importers';
 import { isLesson } from '../lessons/recognise';
 import type { Session, SourceFile } from '../session/file';
-import { isSession, SMALL } from '../session/recognise';
+import { isSession } from '../session/recognise';
+import { areSmall } from '../small-files';
 import { text } from '../texts';
 import { readFiles } from '../ui/files';
 import type { ErrorBanner, StatusLine } from '../ui/status';
@@ -118,7 +119,7 @@ export class Sessions {
   async #read(file: File): Promise<void> {
     const { readApart } = await import('../session/apart');
     const read = await readApart(new Uint8Array(await file.arrayBuffer()));
-    const session: Session = { ...read, isSmall: file.size <= SMALL };
+    const session: Session = { ...read, isSmall: areSmall([file]) };
     if (session.lab === this.#lab.id) await this.#open(session);
     else this.#lab.passOn({ lab: session.lab, session, name: '', bytes: new Uint8Array(), params: {} });
   }

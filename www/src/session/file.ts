@@ -5,9 +5,10 @@
 import { strFromU8, strToU8, type Zippable, zipSync } from 'three/addons/libs/fflate.module.js';
 import { ArchiveTooLarge, MOST_FILES, unpack } from '../archive';
 import type { FileNotes, NamedBytes } from '../protocol';
+import { SMALL } from '../small-files';
 import { text } from '../texts';
 import { decode, encode, type Parts } from './codec';
-import { INDEX, SMALL } from './recognise';
+import { INDEX } from './recognise';
 import { checked, type Session, shown } from './schema';
 
 const FORMAT = 'vesicle-session';

@@ -4,8 +4,6 @@ import type { ContentOf, Session } from './schema';
 
 /** Name of the file in a session that describes it. */
 export const INDEX = 'session.json';
-/** Largest size of a file that is small, in bytes: it may come from anyone, and may not take long. */
-export const SMALL = 2 ** 17;
 const ENDING = '.vesicle.zip';
 
 /** Returns whether a file is a session, by its name or by the first entry of the ZIP that it is. */

@@ -1,7 +1,7 @@
 /** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
 
 import { SurfaceTracker, Volume } from 'vesicle';
-import { SMALL } from '../session/recognise';
+import { areSmall, SMALL } from '../small-files';
 import { text } from '../texts';
 import { invert } from '../view/anatomy';
 import { groupFiles } from '../worker/file-groups';
@@ -57,8 +57,7 @@ export function checkSmall(
   { dims, frames, spacing }: Pick<Volume, 'dims' | 'frames' | 'spacing'>,
   preparation: Preparation,
 ): void {
-  if (!('files' in source) || !enriches(preparation)) return;
-  if (source.files.reduce((sum, { bytes }) => sum + bytes.length, 0) > SMALL) return;
+  if (!('files' in source) || !enriches(preparation) || !areSmall(source.files)) return;
   const [finest, middle, thickest] = [...spacing].sort((a, b) => a - b) as [number, number, number];
   const factor =
     preparation.factor || Math.min(MOST_SLICES, Math.max(1, Math.round(thickest / ((finest + middle) / 2))));

@@ -26,12 +26,15 @@ type OnReport = (run: ComparisonProgressEvent['run'], report: StepReport) => voi
 export async function compare(
   volume: Volume,
   setup: Setup,
+  maxVertices: number | undefined,
   signal: AbortSignal,
   onReport: OnReport,
 ): Promise<Requests['compare']['reply']> {
   try {
-    const direct = await once(volume, { ...setup, levels: 0 }, signal, (report) => onReport('direct', report));
-    const coarseToFine = await once(volume, setup, signal, (report) => onReport('coarseToFine', report));
+    const direct = await once(volume, { ...setup, levels: 0 }, maxVertices, signal, (report) =>
+      onReport('direct', report),
+    );
+    const coarseToFine = await once(volume, setup, maxVertices, signal, (report) => onReport('coarseToFine', report));
     return { direct, coarseToFine };
   } catch (error) {
     if (signal.aborted) return undefined;
@@ -42,10 +45,11 @@ export async function compare(
 async function once(
   volume: Volume,
   setup: Setup,
+  maxVertices: number | undefined,
   signal: AbortSignal,
   onReport: (report: StepReport) => void,
 ): Promise<ExtractionRun> {
-  const model = buildModel(volume, setup);
+  const model = buildModel(volume, setup, maxVertices);
   try {
     const byLevel = Array.from({ length: setup.levels + 1 }, (_, i) => ({
       level: setup.levels - i,

@@ -51,10 +51,10 @@ export class LargeVolume {
   }
 
   /** Builds a model that starts on the coarsest level, and ends as many levels below as the set-up says. */
-  model(setup: Setup): DeformableModel {
+  model(setup: Setup, maxVertices?: number): DeformableModel {
     const coarser = this.coarserLevels;
     if (setup.levels > coarser) throw new Refusal('invalid-argument', text('extract.largeLevels', { most: coarser }));
-    const { levels, ...options } = modelOptions(this.#coarsest, setup);
+    const { levels, ...options } = modelOptions(this.#coarsest, setup, maxVertices);
     const image = { volume: this.#image, finest: coarser - levels, ...(setup.box && { box: setup.box }) };
     return withAttractors(setup, () => new DeformableModel({ ...options, ...image }));
   }

@@ -25,13 +25,14 @@ export function startOf({ start }: Setup, iso: number): Options['start'] {
 }
 
 /** Returns the options of the model of a set-up; if that has no iso value, one is chosen from the histogram of `volume`. */
-export function modelOptions(volume: Volume, setup: Setup) {
+export function modelOptions(volume: Volume, setup: Setup, maxVertices?: number) {
   const chosen = setup.params.iso;
   const iso = typeof chosen === 'number' ? chosen : otsu(volume.histogram(HISTOGRAM_BINS), volume.range);
   return {
     start: startOf(setup, iso),
     levels: setup.levels,
     ...(setup.edge === undefined ? {} : { edge: setup.edge }),
+    ...(maxVertices !== undefined && { maxVertices }),
     params: { ...setup.params, iso },
   };
 }
@@ -55,13 +56,14 @@ export function fittingSetup(setup: Setup, volume: Volume): Setup {
   return { ...setup, levels: Math.min(setup.levels, DeformableModel.maxLevels(volume)) };
 }
 
-export function buildModel(volume: Volume, setup: Setup): DeformableModel {
-  return withAttractors(setup, () => new DeformableModel({ ...modelOptions(volume, setup), volume }));
+export function buildModel(volume: Volume, setup: Setup, maxVertices?: number): DeformableModel {
+  return withAttractors(setup, () => new DeformableModel({ ...modelOptions(volume, setup, maxVertices), volume }));
 }
 
 /** Builds a model with the state of a saved run; its own initial surface is replaced at once. */
-export function restoredModel(volume: Volume, { state, levels }: SavedRun): DeformableModel {
-  const model = new DeformableModel({ volume, levels, start: 'enclosing' });
+export function restoredModel(volume: Volume, { state, levels }: SavedRun, maxVertices?: number): DeformableModel {
+  const most = maxVertices !== undefined && { maxVertices };
+  const model = new DeformableModel({ volume, levels, start: 'enclosing', ...most });
   try {
     model.restore(state);
   } catch (error) {
