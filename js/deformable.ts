@@ -16,6 +16,7 @@ import { NeedsDataError } from './error.js';
 import { Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { frameOf } from './mesh-file.js';
 import { Handle } from './runtime.js';
+import { isOfSmall, isSmall, MOST_VERTICES_OF_SMALL } from './small-files.js';
 import { type SparseBox, type SparseSource, sparseSource, supply } from './sparse.js';
 import {
   checkedSlices,
@@ -184,9 +185,10 @@ export interface DeformableOptions {
    */
   edge?: number;
   /**
-   * Largest number of vertices of the surface, default and at most 4 million; a run that would exceed it fails with
-   * `too-large`. A contour that the surface starts from has at most four times as many triangles. Fewer bound memory and
-   * time where volumes come from strangers.
+   * Largest number of vertices of the surface; a run that would exceed it fails with `too-large`. By default, and at most,
+   * 4 million, or 300,000 by default if the files of the volume have at most 128 KiB, all together: these may come from
+   * anyone and unpack to a lattice of any size. Contours that the surface starts from, or is compared
+   * with, have at most eight times as many triangles.
    */
   maxVertices?: number;
   /** Initial parameters: any subset; the others have their defaults. */
@@ -219,6 +221,8 @@ export class DeformableModel implements Stepper {
   readonly #sparse: SparseParts | undefined;
   readonly #runner = new Runner();
   readonly #warnings: ModelWarnings;
+  /** Whether the surface may have few vertices only, as no more has been read of a large volume than a small file has. */
+  #isBounded: boolean;
 
   /**
    * Creates a model with its initial surface, ready to step.
@@ -246,6 +250,7 @@ export class DeformableModel implements Stepper {
       const make = dense(this.#volume, options, (...of) => new RawDeformable(...of));
       this.#handle = new Handle('DeformableModel', make);
     }
+    this.#isBounded = source !== undefined && options.maxVertices === undefined;
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     const start = options.start instanceof Mesh ? options.start.warnings : [];
     this.#warnings = new ModelWarnings((source ?? (options.volume as Volume)).warnings, start);
@@ -410,6 +415,10 @@ export class DeformableModel implements Stepper {
         volume.use((raw) => raw.insert(level, Uint32Array.from(min), Uint32Array.from(dims), voxels)),
       );
     await supply(source, needs, insert, checked);
+    if (this.#isBounded && !isSmall(source.stored())) {
+      this.#handle.use((raw) => raw.setMaxVertices());
+      this.#isBounded = false;
+    }
   }
 
   /**
@@ -550,6 +559,9 @@ class Created {
   ) {}
 }
 
+/** Returns the most vertices of a surface in a volume by default, undefined for those of the core. */
+const mostOf = (ofSmall: boolean) => (ofSmall ? MOST_VERTICES_OF_SMALL : undefined);
+
 /** Returns a function that makes what needs the arguments of a model of a volume in memory. */
 function dense<T>(
   volume: Handle<RawVolume>,
@@ -557,7 +569,8 @@ function dense<T>(
   make: (...of: ConstructorParameters<typeof RawDeformable>) => T,
 ): () => T {
   const params = shallowCopy('params', options.params ?? {});
-  const { frame = 0, start = 'contour', levels = 0, edge, maxVertices } = options;
+  const { frame = 0, start = 'contour', levels = 0, edge } = options;
+  const maxVertices = options.maxVertices ?? mostOf(isOfSmall(options.volume));
   for (const name of ['finest', 'box'] as const) {
     if (options[name] !== undefined) throw invalid(name, 'only for volumes larger than memory');
   }
@@ -572,12 +585,13 @@ function dense<T>(
 
 /** Returns a function that makes what needs the arguments of a model of a volume larger than memory. */
 function onSparse<T>(
-  { volume }: SparseParts,
+  { source, volume }: SparseParts,
   options: Options,
   make: (...of: Parameters<typeof RawDeformable.newSparse>) => T,
 ): () => T {
   const params = shallowCopy('params', options.params ?? {});
-  const { start = 'contour', finest = 0, edge, maxVertices, box } = options;
+  const { start = 'contour', finest = 0, edge, box } = options;
+  const maxVertices = options.maxVertices ?? mostOf(isSmall(source.stored()));
   for (const name of ['frame', 'levels'] as const) {
     if (options[name] !== undefined) throw invalid(name, 'not for volumes larger than memory');
   }

@@ -34,5 +34,22 @@ export function limitOfSmall(help = STORE_PLAIN): string {
   return `files of up to ${SMALL / 2 ** 10} KiB may unpack to ${MOST_OF_SMALL / 2 ** 20} MiB: ${help}`;
 }
 
+/**
+ * Most vertices of a surface in an image of small files, unless its maker allows more: a run and a measurement of its
+ * coverage then take about half a gigabyte.
+ */
+export const MOST_VERTICES_OF_SMALL = 300_000;
+
+/** Property of voxels and volumes that come from small files; the same in all entry points. */
+const OF_SMALL = Symbol.for('vesicle of small files');
+
+/** Notes whether voxels, or a volume, come from small files, of `stored` bytes, all together; returns them. */
+export function noted<T extends object>(unpacked: T, stored: number): T {
+  return isSmall(stored) ? Object.defineProperty(unpacked, OF_SMALL, { value: true }) : unpacked;
+}
+
+/** Returns whether voxels, or a volume, come from small files, as {@link noted}. */
+export const isOfSmall = (unpacked: unknown): boolean => OF_SMALL in Object(unpacked);
+
 /** Returns a number of bytes in MiB, rounded up to a tenth. */
 const mebibytes = (bytes: number) => Math.ceil((bytes / 2 ** 20) * 10) / 10;

@@ -43,6 +43,8 @@ export interface SparseSource {
   read(box: SparseBox, signal: AbortSignal | undefined): Promise<VoxelArray>;
   /** Number of chunks that are read at the same time. */
   concurrency: number;
+  /** Returns the number of bytes of chunks that have been read, as they are stored. */
+  stored(): number;
   /** Returns the numbers of chunks and bytes that have been read from all levels. */
   loaded(): { chunks: number; bytes: number };
 }

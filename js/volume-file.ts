@@ -12,6 +12,11 @@ export type ReaderArguments = [
   string | undefined,
 ];
 
+/** Returns the number of bytes of all files that are read. */
+export function bytesOf([bytes, data, , beside]: ReaderArguments): number {
+  return beside.reduce((sum, { length }) => sum + length, bytes.length + (data?.length ?? 0));
+}
+
 /** Returns the arguments for the readers; throws `invalid-argument` naming the option that is wrong. */
 export function readerArguments(bytes: Uint8Array, options: VolumeFileOptions | undefined): ReaderArguments {
   const { data, files, space } = checkProperties<VolumeFileOptions>('options', options, ['data', 'files', 'space']);

@@ -15,11 +15,12 @@ import {
 } from './check.js';
 import type { LengthUnit, Space, Vec3, VolumeFileOptions, VolumeInit, VoxelArray } from './data.js';
 import { Handle } from './runtime.js';
-import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
+import { isOfSmall, noted } from './small-files.js';
+import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
 import * as glue from './vesicle.js';
 import { RawVolume } from './vesicle.js';
-import { readerArguments } from './volume-file.js';
+import { bytesOf, readerArguments } from './volume-file.js';
 import type { Warning } from './warning.js';
 import { checkedWarnings, placeOf } from './warnings.js';
 
@@ -76,6 +77,7 @@ export class Volume {
   constructor(init: VolumeInit) {
     const made: unknown = init;
     this.#handle = made instanceof Handle ? made : new Handle('Volume', () => fromInit(init));
+    if (!(made instanceof Handle) && isOfSmall(init.data)) noted(this, 0);
   }
 
   /**
@@ -94,7 +96,10 @@ export class Volume {
    */
   static parse(bytes: Uint8Array, options?: VolumeFileOptions): Volume {
     const given = readerArguments(bytes, options);
-    return wrap(() => RawVolume.parse(...given));
+    return noted(
+      wrap(() => RawVolume.parse(...given)),
+      bytesOf(given),
+    );
   }
 
   /**
@@ -110,11 +115,12 @@ export class Volume {
     const { frameSeconds } = checkProperties('options', options, ['frameSeconds']);
     if (frameSeconds !== undefined) positive('frameSeconds', frameSeconds);
     const handles = denseCopy('frames', frames).map((frame, index) => volumeHandle(`frames[${index}]`, frame));
-    return wrap(() => {
+    const joined = wrap(() => {
       const collected = new glue.RawFrames();
       for (const handle of handles) handle.use((raw) => collected.push(raw));
       return collected.join(frameSeconds);
     });
+    return frames.every(isOfSmall) ? noted(joined, 0) : joined;
   }
 
   /**

@@ -4,7 +4,7 @@ import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
 import { withPause } from '../pause.js';
 import { shortened } from '../short-text.js';
-import { STORE_PLAIN, unpackingProblem } from '../small-files.js';
+import { noted, STORE_PLAIN, unpackingProblem } from '../small-files.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import type { Warning } from '../warning.js';
 import type { Decoders } from './codecs.js';
@@ -161,7 +161,7 @@ export function allocated(
   const part = files.length === 1 ? shortened(files[0]?.name ?? '') : `${files.length} files`;
   if (problem) throw new VesicleError('too-large', `DICOM: ${part}: ${problem}`);
   try {
-    return new Kind(length);
+    return noted(new Kind(length), stored);
   } catch {
     throw new VesicleError('too-large', `DICOM: voxels: no memory for ${length} voxels`);
   }

@@ -22,8 +22,9 @@ import { MeshFile, NamedFile, VolumeFile } from '../files.js';
 import { checkedFileOptions, sayingHow, stated } from '../mesh-file.js';
 import { parsePoints as points } from '../points.js';
 import { call, restart } from '../runtime.js';
+import { noted } from '../small-files.js';
 import { rawTexture, textureOf } from '../texture.js';
-import { readerArguments } from '../volume-file.js';
+import { bytesOf, readerArguments } from '../volume-file.js';
 import type { Warning } from '../warning.js';
 
 export type {
@@ -56,7 +57,9 @@ export type { Warning, WarningCode } from '../warning.js';
  */
 export function parseVolume(bytes: Uint8Array, options?: VolumeFileOptions): VolumeInit {
   const given = readerArguments(bytes, options);
-  return inOwnInstance(() => volumeData(VolumeFile.parse(...given)));
+  const volume = inOwnInstance(() => volumeData(VolumeFile.parse(...given)));
+  noted(volume.data, bytesOf(given));
+  return volume;
 }
 
 /**

@@ -3,7 +3,7 @@ import { checkProperties, integer, invalid } from '../check.js';
 import type { LengthUnit, Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { type Pause, withPause } from '../pause.js';
 import { shortened } from '../short-text.js';
-import { isSmall, unpackingProblem } from '../small-files.js';
+import { isSmall, noted, unpackingProblem } from '../small-files.js';
 import { checkListener, checkSignal } from '../stepper.js';
 import type { Warning } from '../warning.js';
 import { decodedBytes, numberBytes } from './blocks.js';
@@ -211,7 +211,8 @@ export class TiffStack {
       await readPlane(plane, formats.get(plane.page) ?? first, slice, listener);
       done += 1;
     }
-    return first.type.bits === 64 && first.type.kind !== 'float' ? narrowed(data, first.type.kind) : data;
+    const narrow = first.type.bits === 64 && first.type.kind !== 'float' ? narrowed(data, first.type.kind) : data;
+    return noted(narrow, this.#size());
   }
 
   #allocate(Kind: new (length: number) => VoxelArray, length: number): VoxelArray {

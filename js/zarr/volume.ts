@@ -61,6 +61,7 @@ export class ZarrVolume {
   #coarsest: VoxelArray | undefined;
   #unread = '';
   #range: [number, number] | undefined;
+  #stored = () => 0;
   #freed = false;
 
   /** @internal */
@@ -141,6 +142,7 @@ export class ZarrVolume {
    * @internal
    */
   async readCoarsest(signal: AbortSignal | undefined, stored: () => number): Promise<void> {
+    this.#stored = stored;
     const index = this.#levels.length - 1;
     const level = levelAt(this.#levels, index);
     this.#unread = whyUnread(level);
@@ -168,6 +170,7 @@ export class ZarrVolume {
         const max = min.map((first, axis) => first + (dims[axis] as number)) as Vec3;
         return (await this.voxels(level, { min, max }, signal && { signal })).data;
       },
+      stored: this.#stored,
       loaded: () => ({
         chunks: this.#seen.reduce((sum, { size }) => sum + size, 0),
         bytes: this.#bytes.reduce((sum, size) => sum + size, 0),

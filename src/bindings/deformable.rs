@@ -147,6 +147,12 @@ impl RawDeformable {
         Ok(RawDeformable(Stepping::new(model)))
     }
 
+    /// Sets the largest number of vertices.
+    #[wasm_bindgen(js_name = setMaxVertices)]
+    pub fn set_max_vertices(&self, most: Option<usize>) {
+        self.ready().set_max_vertices(most);
+    }
+
     /// Returns the largest number of pyramid levels above a volume.
     #[wasm_bindgen(js_name = maxLevels)]
     pub fn max_levels(volume: &RawVolume) -> usize {

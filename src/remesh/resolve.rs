@@ -175,6 +175,11 @@ impl Resolver {
         self.max_vertices
     }
 
+    /// Sets the number of vertices at which edges are no longer split.
+    pub fn set_max_vertices(&mut self, most: usize) {
+        self.max_vertices = most;
+    }
+
     /// Returns the limit [`Self::max_vertices`] if the last call of [`Self::resolve`] left an edge too long because of
     /// it; `None` otherwise, or if asked again.
     pub fn take_overflow(&mut self) -> Option<usize> {

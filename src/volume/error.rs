@@ -14,7 +14,7 @@ pub enum VolumeError {
     /// A contour would have more triangles than what starts from it may have.
     #[error(
         "the contour has more than {most} triangles, which is the most: choose another iso value, a coarser volume, voxels more nearly \
-         cubes (long ones are divided), or another start"
+         cubes (long ones are divided), another start, or more vertices"
     )]
     TooManyTriangles {
         /// Largest number of triangles.

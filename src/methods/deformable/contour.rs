@@ -14,12 +14,6 @@ use crate::volume::{
 };
 use std::borrow::Cow;
 
-/// The number of triangles that a contour may have whatever its image, and the number for each voxel, or each part of
-/// elongated voxels, that it may have beyond that: noise and lattices have more, bone with pores as wide as five voxels
-/// has half as many. A kilobyte can stand for a lattice of any size.
-const ALWAYS: usize = 1_600_000;
-const TRIANGLES_PER_VOXEL: f64 = 0.5;
-
 /// The least δ, in voxels of the pyramid level, for which a contour is simplified by merging clusters of vertices; for
 /// finer meshes, clusters as large as a voxel are too coarse.
 const MIN_SIDE: f32 = 0.7;
@@ -89,7 +83,7 @@ pub(super) struct ContourRule {
     pub(super) object: ObjectIs,
     /// The least volume of a closed part, of the object or around a cavity, in model units; smaller ones are left out.
     pub(super) smallest_part: f64,
-    /// The largest number of triangles; fewer in small images, see [`ALWAYS`].
+    /// The largest number of triangles.
     pub(super) most: usize,
 }
 
@@ -164,8 +158,6 @@ pub(super) async fn contour_in_slices(
     ContourRule { iso, object, most, .. }: ContourRule,
     pauses: &Pauses,
 ) -> Result<TriangleMesh, MethodError> {
-    let voxels = grid.dims().map(|n| n as f64).iter().product::<f64>();
-    let most = most.min(ALWAYS.max((TRIANGLES_PER_VOXEL * voxels) as usize));
     Ok(match object {
         ObjectIs::Brighter => marching_cubes_in_slices(grid, iso, most, pauses).await?,
         ObjectIs::Darker => marching_cubes_in_slices(&Negated(grid), -iso, most, pauses).await?,

@@ -2,6 +2,8 @@
 //! inflate the surface for ever.
 
 use crate::math::{Bounds, Vec3};
+use crate::mesh::{Mesh, TriangleMesh};
+use crate::methods::MethodError;
 
 /// The size of the domain, the box in which vertices must stay, as a multiple of the rounded box around the whole
 /// image.
@@ -24,9 +26,9 @@ const MAX_VERTICES: usize = 4_000_000;
 /// an object has as many.
 const MOST_TRIANGLES: usize = 6_000_000;
 
-/// The largest number of triangles of a contour for each vertex that the surface may have: bringing its edges within
-/// bounds removes half of its vertices or more.
-const TRIANGLES_PER_VERTEX: usize = 4;
+/// The largest number of triangles of a contour for each vertex that the surface may have; spheres, whose edges become
+/// long, need 6.
+const TRIANGLES_PER_VERTEX: usize = 8;
 
 /// A box around the image in model space, in which all vertices must stay, with the rounded box that it is made from.
 #[derive(Clone, Copy, Debug)]
@@ -75,14 +77,26 @@ impl Domain {
         }
     }
 
-    /// Returns the domain with at most `most` vertices of a surface in it.
-    pub(super) fn with_at_most(self, most: usize) -> Self {
-        Self { max_vertices: most.min(MAX_VERTICES), ..self }
+    /// Returns the domain with at most `most` vertices of a surface in it, by default [`MAX_VERTICES`].
+    pub(super) fn with_at_most(self, most: Option<usize>) -> Self {
+        Self { max_vertices: most.map_or(MAX_VERTICES, |most| most.min(MAX_VERTICES)), ..self }
     }
 
     /// Returns the largest number of triangles of a contour.
     pub(super) fn most_triangles(&self) -> usize {
         self.max_vertices.saturating_mul(TRIANGLES_PER_VERTEX).min(MOST_TRIANGLES)
+    }
+
+    /// Returns a mesh of a contour whose edges are still to be brought within bounds.
+    ///
+    /// # Errors
+    /// [`MethodError::TooManyVertices`] if it has more than twice the vertices that a surface may have; edits remove half
+    /// of those of a contour, or more. [`MethodError::Mesh`].
+    pub(super) fn start_mesh(&self, contour: &TriangleMesh) -> Result<Mesh, MethodError> {
+        if contour.positions.len() > 2 * self.max_vertices {
+            return Err(MethodError::TooManyVertices { most: self.max_vertices });
+        }
+        Ok(Mesh::from_triangles(contour)?)
     }
 
     /// Returns the approximate number of vertices of the enclosing start surface for the lower edge bound `delta`, δ,

@@ -119,8 +119,8 @@ pub struct DeformableOptions {
     pub edge: Option<f64>,
     /// The parameters of the model; by default [`DeformableParams::for_volume`].
     pub params: Option<DeformableParams>,
-    /// The largest number of vertices of the surface, by default four million. A contour that it starts from has at most
-    /// four times as many triangles.
+    /// The largest number of vertices of the surface, by default four million. Contours that it starts from, or is compared
+    /// with, have at most eight times as many triangles.
     pub max_vertices: Option<usize>,
 }
 
@@ -315,6 +315,13 @@ impl DeformableModel {
         })
     }
 
+    /// Sets the largest number of vertices of the surface, see [`DeformableOptions::max_vertices`].
+    pub fn set_max_vertices(&mut self, most: Option<usize>) {
+        self.domain = self.domain.with_at_most(most);
+        let finest = self.pyramid.delta_at(self.finest_delta, 0);
+        self.resolver.set_max_vertices(self.domain.most_vertices(finest));
+    }
+
     /// Returns the largest [`DeformableOptions::levels`] for a volume: each level has at least two voxels along every
     /// axis.
     pub fn max_levels(volume: &Volume) -> usize {
@@ -333,7 +340,7 @@ impl DeformableModel {
         let finest_delta = finest_delta(edge, voxel, pyramid.dims())?;
         let level = pyramid.levels.len() - 1;
         let delta = pyramid.delta_at(finest_delta, level);
-        let domain = Domain::new(pyramid.dims(), delta).with_at_most(max_vertices.unwrap_or(usize::MAX));
+        let domain = Domain::new(pyramid.dims(), delta).with_at_most(max_vertices);
         let context = StartContext::of(&pyramid, &params, domain, delta, &to_world);
         let from_contour = start == Start::Contour;
         let contour = if from_contour { contour_mesh(&context, pauses).await? } else { None };

@@ -419,7 +419,7 @@ pub(super) async fn contour_mesh(
     }
     let surface = simplified(surface, context.image, context.sampling.shortest(), pauses).await;
     pauses.now().await;
-    Ok(Some(Mesh::from_triangles(&surface)?))
+    Ok(Some(context.domain.start_mesh(&surface)?))
 }
 
 async fn iso_surface(context: &StartContext<'_>, iso: f32, pauses: &Pauses) -> Result<Mesh, MethodError> {
@@ -432,7 +432,7 @@ async fn iso_surface(context: &StartContext<'_>, iso: f32, pauses: &Pauses) -> R
             "the image has no surface at this intensity",
         ));
     }
-    Ok(Mesh::from_triangles(&placed(surface, position))?)
+    context.domain.start_mesh(&placed(surface, position))
 }
 
 async fn caller_mesh(

@@ -156,7 +156,7 @@ impl DeformableModel {
 
     fn domain_for(&self, finest_delta: f64) -> Domain {
         let coarsest = self.pyramid.delta_at(finest_delta, self.pyramid.levels.len() - 1);
-        Domain::new(self.pyramid.dims(), coarsest).with_at_most(self.domain.max_vertices)
+        Domain::new(self.pyramid.dims(), coarsest).with_at_most(Some(self.domain.max_vertices))
     }
 
     fn take_state(&mut self, state: State) -> Result<(), MethodError> {

@@ -31,7 +31,7 @@ interface OpenedVolume extends Loaded {
 }
 
 /** Most vertices of the surface of an image in small files: with more, the page takes over a gigabyte. */
-const MOST_OF_SMALL = 400_000;
+const MOST_OF_SMALL = 300_000;
 
 /** Opens volumes in the Extract lab, and builds models of them. */
 export class ExtractOpening extends Opening<Example, Linked, ImageSource, OpenedVolume> {

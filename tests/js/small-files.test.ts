@@ -1,0 +1,124 @@
+// Models of images in small files, which may come from anyone and stand for a lattice of any size.
+import { deflateSync, gzipSync } from 'node:zlib';
+import { expect, test } from 'vitest';
+import startReaders, { parseVolume } from '../../pkg/import/index.js';
+import { DeformableModel, Volume } from '../../pkg/index.js';
+import { readTiff } from '../../pkg/tiff/index.js';
+import { openZarr } from '../../pkg/zarr/index.js';
+import { ball, HEALTHY, rejection } from './helpers.js';
+import { dataStart, tiffOf } from './made-tiff.js';
+import { TestStore } from './zarr-stores.js';
+
+const SIZE = 104;
+
+/** Rods of one voxel, whose contour has two triangles for each voxel of the image. */
+const rods = Uint8Array.from({ length: SIZE ** 3 }, (_, i) => {
+  const [x, y] = [i % SIZE, Math.floor(i / SIZE) % SIZE];
+  return x % 2 === 0 && y % 2 === 0 ? 200 : 0;
+});
+
+function nrrd(encoding: 'gzip' | 'raw'): Uint8Array {
+  const header = `NRRD0004\ntype: uint8\ndimension: 3\nsizes: ${SIZE} ${SIZE} ${SIZE}\nencoding: ${encoding}\n\n`;
+  return new Uint8Array(Buffer.concat([Buffer.from(header), encoding === 'gzip' ? gzipSync(rods) : rods]));
+}
+
+function tiff(): Uint8Array {
+  const form = { isBig: false, isLittle: true };
+  const slice = new Uint8Array(deflateSync(rods.subarray(0, SIZE ** 2)));
+  const slices = Array.from({ length: SIZE }, (_, z) => {
+    const tags: [number, number][] = [
+      ...([
+        [256, SIZE],
+        [257, SIZE],
+        [258, 8],
+        [259, 8],
+        [262, 1],
+      ] as [number, number][]),
+      ...([
+        [273, dataStart(form) + z * slice.length],
+        [278, SIZE],
+        [279, slice.length],
+      ] as [number, number][]),
+    ];
+    return tags.map(([tag, value]) => ({ tag, type: 4, values: [value] }));
+  });
+  return new Uint8Array(tiffOf(new Array(SIZE).fill(slice), slices, form));
+}
+
+async function zarr() {
+  const json = (value: unknown) => new TextEncoder().encode(JSON.stringify(value));
+  const axes = ['z', 'y', 'x'].map((name) => ({ name, type: 'space' }));
+  const coordinateTransformations = [{ type: 'scale', scale: [1, 1, 1] }];
+  const multiscales = [{ axes, datasets: [{ path: '0', coordinateTransformations }] }];
+  const shape = [SIZE, SIZE, SIZE];
+  const array = {
+    ...{ zarr_format: 3, node_type: 'array', shape, data_type: 'uint8', fill_value: 0, attributes: {} },
+    chunk_grid: { name: 'regular', configuration: { chunk_shape: shape } },
+    chunk_key_encoding: { name: 'default', configuration: { separator: '/' } },
+    codecs: [
+      { name: 'bytes', configuration: { endian: 'little' } },
+      { name: 'gzip', configuration: { level: 9 } },
+    ],
+  };
+  const files: [string, Uint8Array][] = [
+    ['/zarr.json', json({ zarr_format: 3, node_type: 'group', attributes: { ome: { version: '0.5', multiscales } } })],
+    ['/0/zarr.json', json(array)],
+    ['/0/c/0/0/0', new Uint8Array(gzipSync(rods))],
+  ];
+  return openZarr(new TestStore(new Map(files)));
+}
+
+const SMALL = {
+  'Volume.parse': async () => Volume.parse(nrrd('gzip')),
+  parseVolume: async () => {
+    await startReaders();
+    return new Volume(parseVolume(nrrd('gzip')));
+  },
+  'a header and its data': async () => {
+    const header = new TextDecoder().decode(nrrd('raw').subarray(0, 80)).split('\n\n')[0]?.replace('raw', 'gzip');
+    const bytes = new TextEncoder().encode(`${header}\ndata file: LIST\nrods.gz\n`);
+    return Volume.parse(bytes, { files: [{ name: 'rods.gz', bytes: new Uint8Array(gzipSync(rods)) }] });
+  },
+  'frames of small files': async () => Volume.fromFrames([Volume.parse(nrrd('gzip')), Volume.parse(nrrd('gzip'))]),
+  readTiff: async () => new Volume(await readTiff([{ name: 'rods.tif', bytes: tiff() }])),
+  openZarr: zarr,
+};
+
+const options = { params: { iso: 100, smallestPart: 1 } };
+
+test.each(Object.entries(SMALL))(
+  'a lattice in a small file is refused unless more vertices are allowed: %s',
+  async (_, open) => {
+    const volume = await open();
+    const byDefault = await rejection(DeformableModel.create({ ...options, volume }));
+    expect(byDefault).toMatchObject({
+      code: 'too-large',
+      message: expect.stringContaining('more than 300000 vertices'),
+    });
+    const allowed = await rejection(DeformableModel.create({ ...options, volume, maxVertices: 100_000 }));
+    expect(allowed).toMatchObject({
+      code: 'too-large',
+      message: expect.stringContaining('more than 800000 triangles'),
+    });
+  },
+);
+
+test('a larger file, or voxels of the caller, may have as many vertices as fit into memory', async () => {
+  for (const volume of [Volume.parse(nrrd('raw')), new Volume({ data: rods, dims: [SIZE, SIZE, SIZE] })]) {
+    const signal = AbortSignal.timeout(1500);
+    const error = await DeformableModel.create({ ...options, volume }, { signal }).catch((reason) => reason);
+    expect(error).toBe(signal.reason);
+  }
+});
+
+test('a run ends with an error where the surface would have more vertices than allowed, and nothing is lost', async () => {
+  // Coarse levels blur the two balls, which the finest has, into one.
+  const volume = ball(64, 22);
+  const most = 2000;
+  const model = new DeformableModel({ volume, levels: 2, maxVertices: most, params: { iso: 0.5, seeding: 'off' } });
+  expect(model.mesh.info().vertices).toBeLessThan(most);
+  const error = await rejection(model.run());
+  expect(error).toMatchObject({ code: 'too-large' });
+  expect(model.mesh.check()).toMatchObject(HEALTHY);
+  expect(model.mesh.info().vertices).toBeLessThanOrEqual(most);
+});
