@@ -40,6 +40,9 @@ export function limitOfSmall(help = STORE_PLAIN): string {
  */
 export const MOST_VERTICES_OF_SMALL = 300_000;
 
+/** Most bytes that slices between those of an image of small files may take, with the work on them. */
+export const MOST_ENRICHED_OF_SMALL = 384 * 2 ** 20;
+
 /** Property of voxels and volumes that come from small files; the same in all entry points. */
 const OF_SMALL = Symbol.for('vesicle of small files');
 
@@ -50,6 +53,11 @@ export function noted<T extends object>(unpacked: T, stored: number): T {
 
 /** Returns whether voxels, or a volume, come from small files, as {@link noted}. */
 export const isOfSmall = (unpacked: unknown): boolean => OF_SMALL in Object(unpacked);
+
+/** Notes that what is made of voxels, or of a volume, comes from small files if they do; returns it. */
+export function notedLike<T extends object>(unpacked: unknown, made: T): T {
+  return isOfSmall(unpacked) ? noted(made, 0) : made;
+}
 
 /** Returns a number of bytes in MiB, rounded up to a tenth. */
 const mebibytes = (bytes: number) => Math.ceil((bytes / 2 ** 20) * 10) / 10;

@@ -16,7 +16,7 @@ import {
 import type { LengthUnit, Space, Vec3, VolumeFileOptions, VolumeInit, VoxelArray } from './data.js';
 import { Handle } from './runtime.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
-import { isOfSmall, noted } from './small-files.js';
+import { isOfSmall, MOST_ENRICHED_OF_SMALL, noted, notedLike } from './small-files.js';
 import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
 import * as glue from './vesicle.js';
 import { RawVolume } from './vesicle.js';
@@ -77,7 +77,7 @@ export class Volume {
   constructor(init: VolumeInit) {
     const made: unknown = init;
     this.#handle = made instanceof Handle ? made : new Handle('Volume', () => fromInit(init));
-    if (!(made instanceof Handle) && isOfSmall(init.data)) noted(this, 0);
+    if (!(made instanceof Handle)) notedLike(init.data, this);
   }
 
   /**
@@ -121,6 +121,14 @@ export class Volume {
       return collected.join(frameSeconds);
     });
     return frames.every(isOfSmall) ? noted(joined, 0) : joined;
+  }
+
+  /** Returns a volume that is made of this one, and is of small files if this is. */
+  #derived(make: (raw: RawVolume) => RawVolume): Volume {
+    return notedLike(
+      this,
+      wrap(() => this.#handle.use(make)),
+    );
   }
 
   /**
@@ -281,7 +289,7 @@ export class Volume {
    */
   binned(factors: Vec3): Volume {
     const counts = Uint32Array.from(numbers('factors', factors, 3), (factor) => integer('factors', factor, { min: 1 }));
-    return wrap(() => this.#handle.use((raw) => raw.binned(counts)));
+    return this.#derived((raw) => raw.binned(counts));
   }
 
   /**
@@ -296,7 +304,8 @@ export class Volume {
    */
   enrichSlices(options: { factor?: number; method?: 'flow' | 'linear' } = {}): Volume {
     const [factor, byFlow] = enrichment(options);
-    return wrap(() => this.#handle.use((raw) => raw.enrichSlices(factor, byFlow)));
+    const most = isOfSmall(this) ? MOST_ENRICHED_OF_SMALL : undefined;
+    return this.#derived((raw) => raw.enrichSlices(factor, byFlow, most));
   }
 
   /**
@@ -317,10 +326,14 @@ export class Volume {
       enrichSlices: async (given = {}) => {
         const [factor, byFlow] = enrichment(given);
         signal?.throwIfAborted();
-        const work = new Handle('Volume', () => this.#handle.use((raw) => raw.enrichInSlices(factor, byFlow)));
+        const most = isOfSmall(this) ? MOST_ENRICHED_OF_SMALL : undefined;
+        const work = new Handle('Volume', () => this.#handle.use((raw) => raw.enrichInSlices(factor, byFlow, most)));
         try {
           const raw = await runInSlices(() => work.use((one) => one.advance()), signal, budgetMs);
-          return wrap(() => raw);
+          return notedLike(
+            this,
+            wrap(() => raw),
+          );
         } finally {
           work.free();
         }
@@ -359,7 +372,7 @@ export class Volume {
   label(value: number | number[]): Volume {
     const list = Array.isArray(value) ? denseCopy('value', value) : [value];
     const values = Float64Array.from(list, (label) => number('value', label));
-    return wrap(() => this.#handle.use((raw) => raw.label(values)));
+    return this.#derived((raw) => raw.label(values));
   }
 
   /**
@@ -375,7 +388,7 @@ export class Volume {
   threshold(low: number, high: number): Volume {
     ordered('low', low);
     ordered('high', high);
-    return wrap(() => this.#handle.use((raw) => raw.threshold(low, high)));
+    return this.#derived((raw) => raw.threshold(low, high));
   }
 
   /**
@@ -408,7 +421,7 @@ export class Volume {
   crop(box: { min: Vec3; max: Vec3 }): Volume {
     const { min, max } = checkProperties('box', shallowCopy('box', box), ['min', 'max']);
     const [from, to] = [counts('box.min', min), counts('box.max', max)];
-    return wrap(() => this.#handle.use((raw) => raw.crop(from, to)));
+    return this.#derived((raw) => raw.crop(from, to));
   }
 
   /**
@@ -431,7 +444,7 @@ export class Volume {
   resample(grid: { dims: Vec3 } | { spacing: Vec3 } | { like: Volume }, how: 'linear' | 'nearest' = 'linear'): Volume {
     const resample = resampling(grid);
     const nearest = choice('how', how, ['linear', 'nearest']) === 'nearest';
-    return wrap(() => this.#handle.use((raw) => resample(raw, nearest)));
+    return this.#derived((raw) => resample(raw, nearest));
   }
 
   /**
@@ -443,7 +456,7 @@ export class Volume {
    */
   frame(index: number): Volume {
     integer('frame', index);
-    return wrap(() => this.#handle.use((raw) => raw.frame(index)));
+    return this.#derived((raw) => raw.frame(index));
   }
 
   /**

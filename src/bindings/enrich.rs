@@ -6,25 +6,32 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
 use super::error::Failure;
 use super::volume::RawVolume;
-use vesicle::pauses::{Computation, Pauses, advance};
+use vesicle::pauses::{Computation, Pauses, advance, finished};
 use vesicle::volume::{Enrichment, Volume, VolumeError};
 
 #[wasm_bindgen]
 impl RawVolume {
     /// Returns the volume with `factor` − 1 slices inserted between neighbouring ones along the axis of the largest
     /// spacing, interpolated by optical flow if `flow`, else linearly. Without `factor`, it is chosen so that voxels
-    /// become nearly cubes.
+    /// become nearly cubes. More than `most` bytes, if they are given, are too large.
     #[wasm_bindgen(js_name = enrichSlices)]
-    pub fn enrich_slices(&self, factor: Option<usize>, flow: bool) -> Result<RawVolume, JsValue> {
-        Ok(RawVolume(self.0.enrich_slices(factor, method(flow)).map_err(Failure::from)?))
+    pub fn enrich_slices(
+        &self,
+        factor: Option<usize>,
+        flow: bool,
+        most: Option<f64>,
+    ) -> Result<RawVolume, JsValue> {
+        let pauses = Pauses::default();
+        let made = self.0.enrich_in_slices(factor, method(flow), whole(most), &pauses);
+        Ok(RawVolume(finished(made).map_err(Failure::from)?))
     }
 
     /// Begins to do the same in slices of work.
     #[wasm_bindgen(js_name = enrichInSlices)]
-    pub fn enrich_in_slices(&self, factor: Option<usize>, flow: bool) -> RawEnrichment {
+    pub fn enrich_in_slices(&self, factor: Option<usize>, flow: bool, most: Option<f64>) -> RawEnrichment {
         let volume = self.0.clone();
         RawEnrichment(Box::pin(async move {
-            volume.enrich_in_slices(factor, method(flow), &Pauses::default()).await
+            volume.enrich_in_slices(factor, method(flow), whole(most), &Pauses::default()).await
         }))
     }
 }
@@ -42,6 +49,10 @@ impl RawEnrichment {
             Poll::Ready(volume) => Ok(Some(RawVolume(volume.map_err(Failure::from)?))),
         }
     }
+}
+
+fn whole(bytes: Option<f64>) -> Option<u64> {
+    bytes.map(|bytes| bytes as u64)
 }
 
 fn method(flow: bool) -> Enrichment {

@@ -24,15 +24,18 @@ pub enum Enrichment {
 /// add no information.
 const MAX_FACTOR: usize = 16;
 
-/// The largest size of the result, in bytes. A whole body in slices of 3 mm, enriched to the size of its pixels, has less;
-/// beside a larger one there is no memory to work with it.
-const MOST_BYTES: u64 = 768 << 20;
+/// The most memory that the result and the images between two slices may take, in bytes. A whole body in slices of 3 mm,
+/// enriched to the size of its pixels, takes less; beside a larger one there is no memory to work with it.
+const MOST_BYTES: u64 = 1 << 30;
 
-/// Returns the number of voxels of the given dimensions; an error if they would take more than [`MOST_BYTES`].
-fn check_size(like: &Voxels, dims: [usize; 4]) -> Result<usize, VolumeError> {
-    let count = dims.iter().fold(1u64, |product, &n| product.saturating_mul(n as u64));
-    let bytes = count.saturating_mul(like.number_size() as u64);
-    if bytes > MOST_BYTES { Err(VolumeError::TooLarge { bytes }) } else { Ok(count as usize) }
+impl Enrichment {
+    /// Returns the bytes that the images between two slices take for each pixel, measured.
+    fn bytes_per_pixel(self) -> u64 {
+        match self {
+            Self::Flow => 80,
+            Self::Linear => 40,
+        }
+    }
 }
 
 impl Volume {
@@ -44,13 +47,13 @@ impl Volume {
     /// changes nothing. Each frame is interpolated separately.
     ///
     /// # Errors
-    /// `factor` not in 1..=16; a single slice along that axis with a factor above 1; [`VolumeError::TooLarge`], also if the
-    /// result would take more than 768 MiB.
+    /// `factor` not in 1..=16; a single slice along that axis with a factor above 1; [`VolumeError::TooLarge`], also if that
+    /// would take more than 1 GiB.
     pub fn enrich_slices(&self, factor: Option<usize>, method: Enrichment) -> Result<Volume, VolumeError> {
-        finished(self.enrich_in_slices(factor, method, &Pauses::default()))
+        finished(self.enrich_in_slices(factor, method, None, &Pauses::default()))
     }
 
-    /// As [`Self::enrich_slices`], with pauses.
+    /// As [`Self::enrich_slices`], with pauses, and in less memory if `most` bytes are given.
     ///
     /// # Errors
     /// Those of [`Self::enrich_slices`].
@@ -58,6 +61,7 @@ impl Volume {
         &self,
         factor: Option<usize>,
         method: Enrichment,
+        most: Option<u64>,
         pauses: &Pauses,
     ) -> Result<Volume, VolumeError> {
         let axis = self.thick_axis();
@@ -76,7 +80,7 @@ impl Volume {
         }
         let mut dims = self.dims;
         dims[axis] = (count - 1) * factor + 1;
-        let mut voxels = self.voxels.zeros_like(check_size(&self.voxels, dims)?)?;
+        let mut voxels = self.voxels.zeros_like(self.checked_size(dims, axis, method, most)?)?;
         for frame in 0..self.frames() {
             self.enrich_frame(frame, axis, factor, method, &mut voxels, pauses).await?;
         }
@@ -92,6 +96,25 @@ impl Volume {
             space: self.space,
         })?;
         Ok(volume.derived(self, Derivation::Interpolated))
+    }
+
+    /// Returns the number of voxels of the result, which has the given dimensions; an error if it would take too much
+    /// memory to make.
+    fn checked_size(
+        &self,
+        dims: [usize; 4],
+        axis: usize,
+        method: Enrichment,
+        most: Option<u64>,
+    ) -> Result<usize, VolumeError> {
+        let product = |of: &[usize]| of.iter().fold(1u64, |product, &n| product.saturating_mul(n as u64));
+        let count = product(&dims);
+        let pixels = product(&dims[..3]) / dims[axis] as u64;
+        let bytes = count
+            .saturating_mul(self.voxels.number_size() as u64)
+            .saturating_add(pixels.saturating_mul(method.bytes_per_pixel()));
+        let most = most.map_or(MOST_BYTES, |most| most.min(MOST_BYTES));
+        if bytes > most { Err(VolumeError::TooLarge { bytes }) } else { Ok(count as usize) }
     }
 
     /// Returns the axis of the largest spacing, across which slices are interpolated; of equal ones z if it is among
@@ -335,9 +358,20 @@ mod tests {
     #[test]
     fn results_without_memory_to_work_with_them_are_refused_at_once() {
         let volume = volume([300, 300, 1200, 1], [1.0, 1.0, 16.0], Voxels::U8(vec![1; 300 * 300 * 1200]));
-        let bytes = 300 * 300 * (1199 * 16 + 1);
+        let bytes = 300 * 300 * (1199 * 16 + 1 + 40);
         let error = volume.enrich_slices(None, Enrichment::Linear).unwrap_err();
         assert_eq!(error, VolumeError::TooLarge { bytes });
+    }
+
+    #[test]
+    fn the_images_between_slices_count_too() {
+        let volume = volume([4000, 4000, 2, 1], [1.0, 1.0, 2.0], Voxels::U8(vec![1; 32_000_000]));
+        let error = volume.enrich_slices(Some(2), Enrichment::Flow).unwrap_err();
+        assert_eq!(error, VolumeError::TooLarge { bytes: 16_000_000 * (3 + 80) });
+        let few = 16_000_000 * (3 + 40) - 1;
+        let pauses = Pauses::default();
+        let made = volume.enrich_in_slices(Some(2), Enrichment::Linear, Some(few), &pauses);
+        assert!(matches!(finished(made), Err(VolumeError::TooLarge { .. })));
     }
 
     #[test]

@@ -7,11 +7,12 @@ use std::task::Poll;
 use vesicle::math::{DAffine3, DMat3, DVec3, Random, Vec3};
 use vesicle::mesh::{Measures, Mesh, MeshError, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::deformable::{
-    Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Start, Topology,
+    Attractor, DeformableModel, DeformableOptions, DeformableParams, Integrator, RestLength, Seeding, Start,
+    Topology,
 };
 use vesicle::methods::{MethodError, StepReport};
 use vesicle::pauses::advance;
-use vesicle::volume::{Volume, VolumeInit, Voxels};
+use vesicle::volume::{Volume, VolumeError, VolumeInit, Voxels};
 use vesicle::warning::WarningCode;
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -646,6 +647,38 @@ fn a_volume_whose_mesh_exceeds_memory_is_refused_at_once() {
     let volume = scenes::volume([20_000, 1, 1], |p| p.x);
     let refusal = DeformableModel::new(&volume, enclosing()).unwrap_err();
     assert!(matches!(refusal, MethodError::TooManyVertices { .. }), "{refusal}");
+}
+
+#[test]
+fn a_surface_has_at_most_as_many_vertices_as_allowed_and_goes_on_once_more_are() {
+    let volume = ball([64, 64, 64], 22.0);
+    let most = 1000;
+    let options = DeformableOptions {
+        levels: 2,
+        params: Some(DeformableParams {
+            iso: 0.5,
+            seeding: Seeding::Off,
+            ..DeformableParams::for_volume(&volume)
+        }),
+        max_vertices: Some(most),
+        ..Default::default()
+    };
+    let mut model = DeformableModel::new(&volume, options).unwrap();
+    let refusal = (0..2000).find_map(|_| model.step().err());
+    assert!(
+        matches!(
+            refusal,
+            Some(
+                MethodError::TooManyVertices { .. }
+                    | MethodError::Volume(VolumeError::TooManyTriangles { .. })
+            )
+        ),
+        "{refusal:?}"
+    );
+    assert!(model.mesh().vertex_count() <= most);
+    assert_eq!(model.mesh().check(), Ok(()));
+    model.set_max_vertices(None);
+    assert!(run(&mut model, 2000).done && model.mesh().vertex_count() > most);
 }
 
 /// Regression: on a coarse level, some vertices of this tooth are where the image is so steep that they oscillated

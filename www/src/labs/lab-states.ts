@@ -22,6 +22,8 @@ export class LabStates {
   readonly #cancellable = new Observable(false);
   /** Whether something else can be opened in place of what is being opened. */
   #hasOther = false;
+  /** Whether what was open is opened again, which would begin anew if it was cancelled. */
+  #isReopening = false;
   /** Whether the worker has a model of the lab's data. */
   ready = false;
   /** Whether the worker has to be restarted before it can serve requests. */
@@ -55,7 +57,8 @@ export class LabStates {
 
   /** Cancelling opens again the data that were open before, or else the first example. */
   #offerCancel(): void {
-    this.#cancellable.value = this.value === 'loading' && (this.ready || this.#hasOther);
+    if (this.value !== 'loading') this.#isReopening = false;
+    this.#cancellable.value = this.value === 'loading' && !this.#isReopening && (this.ready || this.#hasOther);
   }
 
   get value(): LabState {
@@ -94,13 +97,21 @@ export class LabStates {
    * changes are complete. Until {@link finishOpening} is called, the present model's state is recorded, but not displayed.
    *
    * @param hasOther - Whether a lab that has no data yet could open something else instead.
+   * @param isReopening - Whether what was open is opened again.
    */
-  async open(text: string, hasOther: boolean): Promise<void> {
+  async open(text: string, hasOther: boolean, isReopening: boolean): Promise<void> {
     this.#opening = true;
     this.load(text);
-    this.#hasOther = hasOther;
+    [this.#hasOther, this.#isReopening] = [hasOther, isReopening];
     this.#offerCancel();
     await this.#queue;
+  }
+
+  /** Answers that the opening is being cancelled; what was open is opened again. */
+  cancel(text: string): void {
+    this.#isReopening = true;
+    this.#offerCancel();
+    this.#status.say(text);
   }
 
   /** Ends {@link open}. From now on the state is that of the new model if `hasModel`, else that of the previous one. */

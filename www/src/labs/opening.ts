@@ -278,10 +278,13 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    */
   async cancel(): Promise<void> {
     const request = this.#requestCount;
+    this.states.cancel(text('labs.cancelling'));
     await Promise.race([this.saved(), later(SAVE_TIMEOUT_MS)]);
     if (request !== this.#requestCount || this.states.value !== 'loading') return;
     this.states.engineBroken = true;
-    const opening = this.#source ? this.reopen() : this.example(this.first);
+    const source = this.#source;
+    const again = () => text('labs.cancelledReopening', { name: source?.name ?? '' });
+    const opening = source ? this.open(source, true, again()) : this.example(this.first);
     const own = this.#requestCount;
     await opening;
     if (own === this.#requestCount && !this.#ui.banner.shown) this.#ui.status.say(text('labs.cancelled'));
@@ -314,16 +317,18 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
 
   /**
    * Opens a source: gets its data, has the worker build a model of it, and displays it. Stops if a newer request to
-   * open something has been made.
+   * open something has been made. The status line says `says` meanwhile.
    */
-  protected async open(source: Source<Example, Linked, Data>, reopening = false): Promise<void> {
+  protected async open(
+    source: Source<Example, Linked, Data>,
+    reopening = false,
+    says = reopening ? text('labs.restartingEngine') : text('labs.opening', { name: source.name }),
+  ): Promise<void> {
     const request = ++this.#requestCount;
     this.superseded();
     if (this.states.canChange) this.save();
-    const changesDone = this.states.open(
-      reopening ? text('labs.restartingEngine') : text('labs.opening', { name: source.name }),
-      source.example !== this.first || source.linked !== undefined || source.session !== undefined,
-    );
+    const isFirst = source.example === this.first && source.linked === undefined && source.session === undefined;
+    const changesDone = this.states.open(says, !isFirst, reopening);
     try {
       await this.#started;
       await this.#needEngine();
