@@ -76,7 +76,7 @@ impl ObjectIs {
 /// if those of that size count; larger limits of the size would change which parts of other images are noise.
 pub(super) const SMALL_PART: f64 = 8.0;
 
-/// What a contour is extracted from a pyramid level by.
+/// Conditions on the contour that is extracted from a pyramid level.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContourRule {
     pub(super) iso: f32,

@@ -101,7 +101,7 @@ struct Tests<'a> {
     share: &'a Cell<f64>,
 }
 
-/// What was found of the triangles of a surface.
+/// Results of the tests of the triangles of a surface.
 struct Covered {
     /// By triangle: whether all of it is within one voxel of the other surface.
     triangles: Vec<bool>,
