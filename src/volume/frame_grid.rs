@@ -40,12 +40,9 @@ impl SharedVoxels {
 
     #[inline]
     fn corners(&self, cell: &Cell) -> [f32; 8] {
-        // Read first: the eight are then scaled together.
-        let stored: [f64; 8] = each!(&*self.voxels, values => {
-            let values = &values[self.start..];
-            cell.corners(|index| values[index].into())
-        });
-        stored.map(|value| self.normalisation.of(value) as f32)
+        each!(&*self.voxels, values => {
+            cell.corners(|index| self.normalised(values[self.start + index]))
+        })
     }
 
     #[inline]
