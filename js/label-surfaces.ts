@@ -3,6 +3,7 @@ import type { Vec3 } from './data.js';
 import { type Mesh, wrapMesh } from './mesh.js';
 import { frameOf, type MeshFrame } from './mesh-file.js';
 import { Handle } from './runtime.js';
+import { isOfSmall, MOST_LABEL_VERTICES_OF_SMALL } from './small-files.js';
 import {
   checkedSlices,
   Runner,
@@ -38,9 +39,15 @@ export interface LabelOptions extends LabelParams {
   volume: Volume;
   /** Labels that get a surface; all others count as background. Default all, including those that are added later. */
   labels?: number[];
+  /**
+   * Largest number of vertices of all surfaces when they are created, one for each cell of the grid through which they pass;
+   * label maps with more are refused. By default, and at most, 8 million, or 1 million by default if the files of the
+   * volume have at most 128 KiB, all together: these may come from anyone.
+   */
+  maxVertices?: number;
 }
 
-const OPTIONS = ['volume', 'labels', 'smoothing', 'edge'];
+const OPTIONS = ['volume', 'labels', 'maxVertices', 'smoothing', 'edge'];
 
 /** Surfaces that are created already, for the constructor. */
 class Created {
@@ -55,10 +62,12 @@ class Created {
 
 /** Returns the volume, and the arguments for the raw object of surfaces or of their creation. */
 function checked(given: LabelOptions) {
-  const { volume, labels, ...params } = checkProperties('options', given, OPTIONS) as LabelOptions;
+  const { volume, labels, maxVertices, ...params } = checkProperties('options', given, OPTIONS) as LabelOptions;
+  if (maxVertices !== undefined) integer('maxVertices', maxVertices, { min: 1 });
   const image = volumeHandle('volume', volume);
   const wanted = labels && Float64Array.from(denseCopy('labels', labels), (label) => number('labels', label));
-  return { volume, image, wanted, params };
+  const most = maxVertices ?? (isOfSmall(volume) ? MOST_LABEL_VERTICES_OF_SMALL : undefined);
+  return { volume, image, wanted, params, most };
 }
 
 /**
@@ -104,8 +113,9 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
   static async create(given: LabelOptions, options?: SliceOptions): Promise<LabelSurfaces> {
     const { signal, budgetMs } = checkedSlices(options);
     signal?.throwIfAborted();
-    const { volume, image, wanted, params } = checked(given);
-    const creation = new Handle('LabelSurfaces', () => image.use((raw) => new RawLabelCreation(raw, wanted, params)));
+    const { volume, image, wanted, params, most } = checked(given);
+    const begin = () => image.use((raw) => new RawLabelCreation(raw, wanted, params, most));
+    const creation = new Handle('LabelSurfaces', begin);
     try {
       const raw = await runInSlices(() => creation.use((one) => one.advance()), signal, budgetMs);
       return new LabelSurfaces(new Created(volume, new Handle('LabelSurfaces', () => raw)) as unknown as LabelOptions);
@@ -233,7 +243,7 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
 }
 
 function create(given: LabelOptions): Created {
-  const { volume, image, wanted, params } = checked(given);
-  const make = () => image.use((raw) => new RawLabelSurfaces(raw, wanted, params));
+  const { volume, image, wanted, params, most } = checked(given);
+  const make = () => image.use((raw) => new RawLabelSurfaces(raw, wanted, params, most));
   return new Created(volume, new Handle('LabelSurfaces', make));
 }

@@ -40,6 +40,9 @@ export function limitOfSmall(help = STORE_PLAIN): string {
  */
 export const MOST_VERTICES_OF_SMALL = 300_000;
 
+/** Most vertices of the surfaces of a label map in small files, unless their maker allows more. */
+export const MOST_LABEL_VERTICES_OF_SMALL = 1_000_000;
+
 /** Most bytes that slices between those of an image of small files may take, with the work on them. */
 export const MOST_ENRICHED_OF_SMALL = 384 * 2 ** 20;
 

@@ -84,9 +84,11 @@ impl RawLabelCreation {
         volume: &RawVolume,
         labels: Option<Vec<f64>>,
         params: &JsValue,
+        max_vertices: Option<usize>,
     ) -> Result<RawLabelCreation, JsValue> {
         let params = with_overrides(&LabelParams::default(), params)?;
-        let creation = LabelSurfaces::begin(&volume.0, labels, params).map_err(Failure::from)?;
+        let creation =
+            LabelSurfaces::begin(&volume.0, labels, params, max_vertices).map_err(Failure::from)?;
         Ok(RawLabelCreation(Box::pin(creation)))
     }
 
@@ -112,15 +114,18 @@ impl RawLabelSurfaces {
 #[wasm_bindgen]
 impl RawLabelSurfaces {
     /// Creates the surfaces of the first frame of a label map, of all labels or those of `labels`. Properties of `params`
-    /// replace the default parameters.
+    /// replace the default parameters. There are at most `max_vertices` vertices, by default those of the core.
     #[wasm_bindgen(constructor)]
     pub fn new(
         volume: &RawVolume,
         labels: Option<Vec<f64>>,
         params: &JsValue,
+        max_vertices: Option<usize>,
     ) -> Result<RawLabelSurfaces, JsValue> {
         let params = with_overrides(&LabelParams::default(), params)?;
-        Ok(Self::of(LabelSurfaces::new(&volume.0, labels, params).map_err(Failure::from)?))
+        let creation =
+            LabelSurfaces::begin(&volume.0, labels, params, max_vertices).map_err(Failure::from)?;
+        Ok(Self::of(finished(creation).map_err(Failure::from)?))
     }
 
     /// Returns the labels that have voxels and a surface, in ascending order.

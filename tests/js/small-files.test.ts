@@ -2,7 +2,7 @@
 import { deflateSync, gzipSync } from 'node:zlib';
 import { expect, test } from 'vitest';
 import startReaders, { parseVolume } from '../../pkg/import/index.js';
-import { DeformableModel, Volume } from '../../pkg/index.js';
+import { DeformableModel, LabelSurfaces, Volume } from '../../pkg/index.js';
 import { readTiff } from '../../pkg/tiff/index.js';
 import { openZarr } from '../../pkg/zarr/index.js';
 import { ball, HEALTHY, rejection } from './helpers.js';
@@ -102,6 +102,17 @@ test.each(Object.entries(SMALL))(
     });
   },
 );
+
+test('a label map of noise in a small file is refused unless more vertices are allowed', async () => {
+  const random = (i: number) => Math.floor(8 * ((Math.sin(i + 1) * 43758.5453) % 1) ** 2);
+  const labels = Uint8Array.from({ length: SIZE ** 3 }, (_, i) => random(i % SIZE ** 2));
+  const header = `NRRD0004\ntype: uint8\ndimension: 3\nsizes: ${SIZE} ${SIZE} ${SIZE}\nencoding: gzip\n\n`;
+  const volume = Volume.parse(new Uint8Array(Buffer.concat([Buffer.from(header), gzipSync(labels)])));
+  const byDefault = await rejection(LabelSurfaces.create({ volume }));
+  expect(byDefault.message).toContain('more than 1000000 cells');
+  const allowed = await rejection(LabelSurfaces.create({ volume, maxVertices: 1_050_000 }));
+  expect(allowed.message).toContain('more than 1050000 cells');
+});
 
 test('a larger file, or voxels of the caller, may have as many vertices as fit into memory', async () => {
   for (const volume of [Volume.parse(nrrd('raw')), new Volume({ data: rods, dims: [SIZE, SIZE, SIZE] })]) {

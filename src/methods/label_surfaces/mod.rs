@@ -124,11 +124,12 @@ impl LabelSurfaces {
     /// [`MethodError::InvalidArgument`] for a volume that is no label map, labels it does not have, or parameters out of
     /// range; an error about memory.
     pub fn new(volume: &Volume, labels: Option<Vec<f64>>, params: LabelParams) -> Result<Self, MethodError> {
-        finished(Self::begin(volume, labels, params)?)
+        finished(Self::begin(volume, labels, params, None)?)
     }
 
     /// Begins to create surfaces as [`Self::new`] does, in [slices](crate::pauses); the volume is not needed any
-    /// more then.
+    /// more then. They have at most `max_vertices` vertices, by default eight million: one for each cell of the grid
+    /// through which they pass.
     ///
     /// # Errors
     /// As [`Self::new`]; some only at the end.
@@ -136,21 +137,23 @@ impl LabelSurfaces {
         volume: &Volume,
         labels: Option<Vec<f64>>,
         params: LabelParams,
+        max_vertices: Option<usize>,
     ) -> Result<impl Future<Output = Result<Self, MethodError>> + use<>, MethodError> {
         params.check_ranges()?;
         check_precision(volume)?;
-        Ok(Self::create(volume.clone(), labels, params))
+        Ok(Self::create(volume.clone(), labels, params, max_vertices))
     }
 
     async fn create(
         volume: Volume,
         labels: Option<Vec<f64>>,
         params: LabelParams,
+        max_vertices: Option<usize>,
     ) -> Result<Self, MethodError> {
         let pauses = Pauses::default();
         let (to_world, grid) = (volume.affine(), LabelGrid::new(&volume, labels, &pauses).await?);
         drop(volume);
-        let nets = Nets::new(grid, to_world, &pauses).await?;
+        let nets = Nets::new(grid, to_world, max_vertices, &pauses).await?;
         let everywhere = nets.everywhere();
         let mut surfaces = Self {
             counts: Counts::default(),

@@ -116,8 +116,15 @@ impl Nets {
     /// space of the volume to world space.
     ///
     /// # Errors
-    /// [`VolumeError::TooLarge`]; [`MethodError::InvalidArgument`] for surfaces through more than [`MOST_CELLS`] cells.
-    pub async fn new(grid: LabelGrid, to_world: DAffine3, pauses: &Pauses) -> Result<Self, MethodError> {
+    /// [`VolumeError::TooLarge`]; [`MethodError::InvalidArgument`] for surfaces through more than `most` cells, by default
+    /// [`MOST_CELLS`].
+    pub async fn new(
+        grid: LabelGrid,
+        to_world: DAffine3,
+        most: Option<usize>,
+        pauses: &Pauses,
+    ) -> Result<Self, MethodError> {
+        let most = most.map_or(MOST_CELLS, |most| most.min(MOST_CELLS));
         let (cells, coarse, of_labels) = (Cells::new(grid.dims())?, Coarsening::default(), Vec::new());
         let origin = grid_origin(&to_world, grid.dims());
         let rounding = rounding(&to_world, grid.dims(), origin);
@@ -125,7 +132,7 @@ impl Nets {
         let everywhere = nets.everywhere();
         let mut changed = nets.no_labels();
         // Counted first, so that what is refused needs no memory.
-        nets.cells.reserve(nets.counted(pauses).await?)?;
+        nets.cells.reserve(nets.counted(most, pauses).await?)?;
         for row in everywhere.rows() {
             let before = nets.cells.slots().len();
             nets.cells.update(&nets.grid, row, &mut changed)?;
@@ -135,14 +142,14 @@ impl Nets {
         Ok(nets)
     }
 
-    /// Returns the number of cells through which surfaces pass.
-    async fn counted(&self, pauses: &Pauses) -> Result<usize, MethodError> {
+    /// Returns the number of cells through which surfaces pass; an error if there are more than `most`.
+    async fn counted(&self, most: usize, pauses: &Pauses) -> Result<usize, MethodError> {
         let mut cells = 0;
         for row in self.everywhere().rows() {
             cells += count_cells(&self.grid, &row);
-            if cells > MOST_CELLS {
+            if cells > most {
                 let problem = format!(
-                    "the surfaces of its labels pass through more than {MOST_CELLS} cells of its grid: choose some labels, or \
+                    "the surfaces of its labels pass through more than {most} cells of its grid: choose some labels, or \
                      crop or resample it"
                 );
                 return Err(MethodError::invalid("volume", problem));

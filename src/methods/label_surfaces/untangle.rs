@@ -439,7 +439,7 @@ mod tests {
         let affine = DAffine3::from_scale(scale);
         let volume = Volume::new(VolumeInit { affine, ..init }).unwrap();
         let grid = finished(LabelGrid::new(&volume, None, &Pauses::default())).unwrap();
-        finished(Nets::new(grid, affine, &Pauses::default())).unwrap()
+        finished(Nets::new(grid, affine, None, &Pauses::default())).unwrap()
     }
 
     /// Returns the cells of all pairs that are tested in a search and intersect, and the number of cells with such pairs.

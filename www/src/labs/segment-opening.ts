@@ -73,7 +73,8 @@ export class SegmentOpening extends Opening<SegmentExample, LinkedSegment, Image
     const { name, linked, session } = origin;
     if (session && !reopening) {
       const { params, voxels: labels, state } = contentOf(session, 'segment');
-      return this.#client.request('open', { name, source, params, labels, state });
+      const isSmall = session.isSmall === true;
+      return this.#client.request('open', { name, source, params, labels, state, isSmall });
     }
     const labels = reopening ? this.#lab.labels() : undefined;
     return this.#client.request('open', { name, source, params: { ...linked?.params }, labels });

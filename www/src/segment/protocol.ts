@@ -102,6 +102,8 @@ export interface Requests {
       params: ParamValues;
       labels: LabelArray | undefined;
       state?: Uint8Array | undefined;
+      /** Whether the labels come from a small session; by default, whether they come from small files. */
+      isSmall?: boolean;
     };
     reply: OpenedImage;
   };

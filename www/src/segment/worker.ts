@@ -2,6 +2,7 @@
 
 import { LabelSurfaces, type Volume } from 'vesicle';
 import { quantize } from '../quantize';
+import { areSmall } from '../small-files';
 import { text } from '../texts';
 import type { Warning } from '../warnings';
 import { Refusal } from '../worker/refusal';
@@ -25,6 +26,9 @@ import { forEachRow } from './region';
 import { withLabels } from './slicer';
 import { mapLike, type OpenMap, type OpenVolume, openImage, openLabels } from './source';
 
+/** Most vertices of the surfaces of labels in small files, and in small sessions: with more, the page takes over a gigabyte. */
+const MOST_OF_SMALL = 1_000_000;
+
 let maps = 0;
 
 /** A label map with its surfaces. */
@@ -44,13 +48,14 @@ class LiveMap {
     voxels: LabelArray,
     warnings: readonly Warning[],
     params: ParamValues,
-    state?: Uint8Array,
+    { isSmall = false, state }: { isSmall?: boolean | undefined; state?: Uint8Array | undefined },
   ) {
     this.voxels = voxels;
     this.map = mapLike(image, voxels, warnings);
     this.#voxelVolume = Math.abs(determinant(image.volume.affine));
     try {
-      this.surfaces = new LabelSurfaces({ volume: this.map, ...params });
+      const most = isSmall && { maxVertices: MOST_OF_SMALL };
+      this.surfaces = new LabelSurfaces({ volume: this.map, ...params, ...most });
       if (state) this.surfaces.restore(state);
     } catch (error) {
       this.map.free();
@@ -137,11 +142,12 @@ class Session {
     exportMesh: ({ value, format, ...options }) => this.#current().surfaces.mesh(value).toBytes(format, options),
   };
 
-  async #openImage({ name, source, params, labels, state }: Requests['open']['body']): Promise<OpenedImage> {
+  async #openImage({ name, source, params, labels, ...session }: Requests['open']['body']): Promise<OpenedImage> {
     const began = performance.now();
     const opened = await openImage(source);
     try {
-      const live = new LiveMap(opened, labels ?? opened.map.voxels, opened.map.warnings, params, state);
+      const known = { isSmall: !labels && areSmall(source.files), ...session };
+      const live = new LiveMap(opened, labels ?? opened.map.voxels, opened.map.warnings, params, known);
       this.#adopt(live);
       this.#open?.volume.free();
       this.#open = opened;
@@ -163,7 +169,8 @@ class Session {
     const began = performance.now();
     const image = this.#image();
     const opened = await openLabels(files, image.volume);
-    const live = new LiveMap(image, opened.voxels, opened.warnings, { ...this.#current().surfaces.params });
+    const params = { ...this.#current().surfaces.params };
+    const live = new LiveMap(image, opened.voxels, opened.warnings, params, { isSmall: areSmall(files) });
     this.#adopt(live);
     const all = this.#all(live, opened, began);
     return withTransfer(all, [...arraysOf(all), all.voxels]);
