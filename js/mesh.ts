@@ -35,6 +35,7 @@ import {
   stated,
 } from './mesh-file.js';
 import { call, Handle } from './runtime.js';
+import { isOfSmall, MOST_TRIANGLES_OF_SMALL } from './small-files.js';
 import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
 // Entry points without readers of files lack `RawMeshFile`, which an import by name would demand.
@@ -347,16 +348,19 @@ export class Mesh {
    * Extracts the iso-surface of a volume by marching cubes, in its world space, closed at the volume's border;
    * topologically consistent. Inside is where the intensity is at least `iso`.
    *
-   * @param options - `frame`: frame of a 4D volume; default 0.
+   * @param options - `frame`: frame of a 4D volume; default 0. `maxTriangles`: largest number of triangles; by default, and
+   *   at most, 8 million, or 1.2 million by default if the files of the volume have at most 128 KiB, all together.
    * @throws {@link VesicleError} `invalid-argument`: no such frame; `too-large`.
    */
-  static marchingCubes(volume: Volume, iso: number, options: { frame?: number } = {}): Mesh {
-    const { frame = 0 } = checkProperties('options', options, ['frame']);
+  static marchingCubes(volume: Volume, iso: number, options: { frame?: number; maxTriangles?: number } = {}): Mesh {
+    const { frame = 0, maxTriangles } = checkProperties('options', options, ['frame', 'maxTriangles']);
     number('iso', iso);
     integer('frame', frame);
+    if (maxTriangles !== undefined) integer('maxTriangles', maxTriangles, { min: 1 });
+    const most = maxTriangles ?? (isOfSmall(volume) ? MOST_TRIANGLES_OF_SMALL : undefined);
     const handle = volumeHandle('volume', volume);
     return handle.use((raw) =>
-      made(() => RawMesh.marchingCubes(raw, iso, frame), {
+      made(() => RawMesh.marchingCubes(raw, iso, frame, most), {
         ...frameOf(volume),
         warnings: inFrame(volume.warnings, frame),
       }),

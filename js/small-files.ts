@@ -40,6 +40,9 @@ export function limitOfSmall(help = STORE_PLAIN): string {
  */
 export const MOST_VERTICES_OF_SMALL = 300_000;
 
+/** Most triangles of an iso-surface of such an image, unless its maker allows more. */
+export const MOST_TRIANGLES_OF_SMALL = 1_200_000;
+
 /** Most vertices of the surfaces of a label map in small files, unless their maker allows more. */
 export const MOST_LABEL_VERTICES_OF_SMALL = 1_000_000;
 

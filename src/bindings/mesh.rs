@@ -23,7 +23,7 @@ use vesicle::mesh::{
 use vesicle::methods::LiveSurface;
 use vesicle::remesh::{EdgeBounds, RestructurePass, decimate, remesh, restructure_in_passes};
 use vesicle::spatial::{SurfaceDistance, SurfacePoint, TriangleTree, cross_section, surface_distance};
-use vesicle::volume::marching_cubes_world;
+use vesicle::volume::marching_cubes_bounded;
 
 /// The content of a JavaScript `Mesh`.
 pub(super) enum MeshKind {
@@ -104,10 +104,17 @@ impl RawMesh {
         Ok(RawMesh(triangle_list(mesh)))
     }
 
-    /// Returns the iso-surface of one frame of a volume at intensity `iso`, in world space, as a list of triangles.
+    /// Returns the iso-surface of one frame of a volume at intensity `iso`, in world space, as a list of triangles: about
+    /// `most` at most.
     #[wasm_bindgen(js_name = marchingCubes)]
-    pub fn marching_cubes(volume: &RawVolume, iso: f64, frame: usize) -> Result<RawMesh, JsValue> {
-        let mesh = marching_cubes_world(&volume.0, iso, frame).map_err(Failure::from)?;
+    pub fn marching_cubes(
+        volume: &RawVolume,
+        iso: f64,
+        frame: usize,
+        most: Option<usize>,
+    ) -> Result<RawMesh, JsValue> {
+        let most = most.unwrap_or(usize::MAX);
+        let mesh = marching_cubes_bounded(&volume.0, iso, frame, most).map_err(Failure::from)?;
         Ok(RawMesh(triangle_list(mesh)))
     }
 

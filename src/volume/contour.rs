@@ -29,11 +29,25 @@ pub(super) const MARGIN: f32 = 1.0 / 256.0;
 /// # Errors
 /// `iso` not finite, `frame` out of range, [`VolumeError::TooLarge`].
 pub fn marching_cubes_world(volume: &Volume, iso: f64, frame: usize) -> Result<TriangleMesh, VolumeError> {
+    marching_cubes_bounded(volume, iso, frame, MOST_TRIANGLES)
+}
+
+/// Extracts the iso-surface as [`marching_cubes_world`], with about `most` triangles at most.
+///
+/// # Errors
+/// As [`marching_cubes_world`]; [`VolumeError::TooManyTriangles`].
+pub fn marching_cubes_bounded(
+    volume: &Volume,
+    iso: f64,
+    frame: usize,
+    most: usize,
+) -> Result<TriangleMesh, VolumeError> {
     if !iso.is_finite() {
         return Err(VolumeError::invalid("iso", format!("must be finite, got {iso}")));
     }
     let (grid, iso) = volume.grid_at(iso, frame)?;
-    let mut mesh = marching_cubes(&grid, iso)?;
+    let most = most.min(MOST_TRIANGLES);
+    let mut mesh = finished(marching_cubes_in_slices(&grid, iso, most, &Pauses::default()))?;
     to_world(&mut mesh, &volume.affine(), volume.dims());
     Ok(mesh)
 }

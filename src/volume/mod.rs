@@ -57,7 +57,7 @@ mod write;
 pub use bricks::BRICK;
 pub(crate) use bricks::{BrickGrid, BrickId};
 pub(crate) use contour::{Slices, marching_cubes_in_slices};
-pub use contour::{marching_cubes, marching_cubes_world};
+pub use contour::{marching_cubes, marching_cubes_bounded, marching_cubes_world};
 pub use coverage::coverage;
 pub use enrich::Enrichment;
 pub use error::VolumeError;

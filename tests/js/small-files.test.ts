@@ -2,10 +2,10 @@
 import { deflateSync, gzipSync } from 'node:zlib';
 import { expect, test } from 'vitest';
 import startReaders, { parseVolume } from '../../pkg/import/index.js';
-import { DeformableModel, LabelSurfaces, Volume } from '../../pkg/index.js';
+import { DeformableModel, LabelSurfaces, Mesh, Volume } from '../../pkg/index.js';
 import { readTiff } from '../../pkg/tiff/index.js';
 import { openZarr } from '../../pkg/zarr/index.js';
-import { ball, HEALTHY, rejection } from './helpers.js';
+import { ball, failure, HEALTHY, rejection } from './helpers.js';
 import { dataStart, tiffOf } from './made-tiff.js';
 import { TestStore } from './zarr-stores.js';
 
@@ -102,6 +102,12 @@ test.each(Object.entries(SMALL))(
     });
   },
 );
+
+test('an iso-surface of a lattice in a small file is refused unless more triangles are allowed', () => {
+  const volume = Volume.parse(nrrd('gzip'));
+  expect(failure(() => Mesh.marchingCubes(volume, 100))).toMatchObject({ code: 'too-large' });
+  expect(Mesh.marchingCubes(volume, 100, { maxTriangles: 3e6 }).triangleCount).toBeGreaterThan(1_200_000);
+});
 
 test('a label map of noise in a small file is refused unless more vertices are allowed', async () => {
   const random = (i: number) => Math.floor(8 * ((Math.sin(i + 1) * 43758.5453) % 1) ** 2);
