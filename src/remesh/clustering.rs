@@ -36,8 +36,12 @@ pub async fn clustered(
         pauses.after(pass).await;
         let merged = clusters.merge(mesh);
         pauses.after(pass).await;
-        if !clusters.dissolve_invalid(mesh, &merged) {
-            pauses.after(pass).await;
+        let mut is_wrong = not_manifold(&merged);
+        pauses.after(pass).await;
+        clusters.mark_turned(mesh, &merged, &mut is_wrong);
+        let has_changed = clusters.dissolve(|c| is_wrong[c as usize]);
+        pauses.after(pass).await;
+        if !has_changed {
             return merged.components_where(|_| true);
         }
     }
@@ -124,18 +128,9 @@ impl Clusters {
         }
     }
 
-    /// Dissolves the clusters that must not be merged: those at edges of more than two triangles of the result
-    /// `merged`, at vertices of fewer than three triangles, and at triangles turned by more than 60° against `mesh`;
-    /// returns whether the partition has changed.
-    fn dissolve_invalid(&mut self, mesh: &TriangleMesh, merged: &TriangleMesh) -> bool {
-        let mut is_wrong = vec![false; self.first.len()];
-        let valences = valences(merged);
-        for (v, &valence) in valences.iter().enumerate() {
-            is_wrong[v] = valence < MIN_VALENCE;
-        }
-        for corner in doubled_edges(merged, &valences).into_iter().flatten() {
-            is_wrong[corner as usize] = true;
-        }
+    /// Marks in `is_wrong` the corners of triangles of the result `merged` that are turned by more than 60° against those of
+    /// `mesh`.
+    fn mark_turned(&self, mesh: &TriangleMesh, merged: &TriangleMesh, is_wrong: &mut [bool]) {
         for &triangle in &mesh.triangles {
             let corners = self.of(triangle);
             if !is_triangle(&corners) {
@@ -147,8 +142,17 @@ impl Clusters {
                 corners.iter().for_each(|&v| is_wrong[v as usize] = true);
             }
         }
-        self.dissolve(|c| is_wrong[c as usize])
     }
+}
+
+/// Returns whether each vertex is one of fewer than three triangles, or at an edge of more than two.
+fn not_manifold(mesh: &TriangleMesh) -> Vec<bool> {
+    let valences = valences(mesh);
+    let mut is_wrong: Vec<_> = valences.iter().map(|&valence| valence < MIN_VALENCE).collect();
+    for corner in doubled_edges(mesh, &valences).into_iter().flatten() {
+        is_wrong[corner as usize] = true;
+    }
+    is_wrong
 }
 
 fn is_triangle([a, b, c]: &[u32; 3]) -> bool {

@@ -29,12 +29,19 @@ impl CylinderTree {
     pub(super) async fn new(triangles: &[[Vec3; 3]], pauses: &Pauses) -> Self {
         let bounds: Vec<_> = triangles.iter().map(|c| Bounds::from_points(c)).collect();
         let mut builder = BoxTreeBuilder::new(&bounds);
+        let mut built = 0;
         while let Some(triangles) = builder.advance() {
-            pauses.after(triangles / TRIANGLES_PER_UNIT).await;
+            built += triangles;
+            // Small subtrees are counted together.
+            if built >= TRIANGLES_PER_UNIT {
+                pauses.after(built / TRIANGLES_PER_UNIT).await;
+                built = 0;
+            }
         }
         let boxes = builder.finish();
         let corners: Vec<_> = boxes.order().map(|t| triangles[t as usize]).collect();
         let (mut cylinders, mut leaves_before, mut leaves) = (Vec::new(), Vec::new(), Vec::new());
+        let mut enclosed = 0;
         for node in 0..boxes.node_count() {
             let own = &corners[boxes.node_range(node)];
             cylinders.push(Cylinder::around(boxes.node_bounds(node), own));
@@ -42,7 +49,11 @@ impl CylinderTree {
             if boxes.children(node).is_none() {
                 leaves.push(FourTriangles::new(own));
             }
-            pauses.after(own.len() / TRIANGLES_PER_UNIT).await;
+            enclosed += own.len();
+            if enclosed >= TRIANGLES_PER_UNIT {
+                pauses.after(enclosed / TRIANGLES_PER_UNIT).await;
+                enclosed = 0;
+            }
         }
         Self { boxes, cylinders, corners, leaves_before, leaves }
     }

@@ -53,9 +53,7 @@ pub async fn lattice_distances(
     while let Some(task) = tasks.pop() {
         match task {
             Task::Search { block, outer, candidates, near } => {
-                let work = candidates.len();
-                search.search(block, outer, candidates, near, &mut tasks);
-                pauses.after(1 + work / CANDIDATES_PER_UNIT).await;
+                search.search(block, outer, candidates, near, &mut tasks, pauses).await;
             }
             Task::Forget(begin) => search.candidates.truncate(begin),
         }
@@ -187,8 +185,13 @@ const ALONG: f64 = 0.05;
 /// Distance below which its direction is not reliable, relative to the size of a block.
 const TOUCHING: f64 = 1e-6;
 
-/// Candidates of a block that are a unit of work.
-const CANDIDATES_PER_UNIT: usize = 16;
+/// Candidates, nodes and leaves that are examined in a unit of work.
+const CANDIDATES_PER_UNIT: usize = 64;
+const NODES_PER_UNIT: usize = 64;
+const LEAVES_PER_UNIT: usize = 16;
+
+/// The number of candidates that are examined between pauses, if there are that many.
+const CANDIDATES_AT_ONCE: usize = 1024;
 
 /// A part of the work, on a stack.
 enum Task {
@@ -211,14 +214,16 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Computes the distances of all points of a block, given as in [`Task::Search`], or has that done by `tasks`.
-    fn search(
+    /// Computes the distances of all points of a block, given as in [`Task::Search`], or has that done by `tasks`. Pauses
+    /// meanwhile.
+    async fn search(
         &mut self,
         block: Block,
         outer: DVec3,
         candidates: Range<usize>,
         near: usize,
         tasks: &mut Vec<Task>,
+        pauses: &Pauses,
     ) {
         let half = block.half();
         let centre = self.map.transform_point3(DVec3::from(block.start.map(|i| i as f64)) + half);
@@ -227,9 +232,15 @@ impl Search<'_> {
         let (near, from) = self.nearest(centre, centre - outer, candidates.clone(), near);
         let bound = UpperBound::new(half_axes, from);
         let begin = self.candidates.len();
-        self.select(&block, centre, centre - outer, candidates, &bound);
+        pauses.after(1 + candidates.len() / CANDIDATES_PER_UNIT).await;
+        for first in candidates.clone().step_by(CANDIDATES_AT_ONCE) {
+            let some = first..candidates.end.min(first + CANDIDATES_AT_ONCE);
+            let work = some.len() / CANDIDATES_PER_UNIT;
+            let nodes = self.select(&block, centre, centre - outer, some, &bound);
+            pauses.after(work + nodes / NODES_PER_UNIT).await;
+        }
         if block.count() <= SMALLEST {
-            Points::new(&block, self, centre, &bound).search(self, begin, &bound);
+            Points::new(&block, self, centre, &bound).search(self, begin, &bound, pauses).await;
             self.candidates.truncate(begin);
         } else {
             tasks.push(Task::Forget(begin));
@@ -265,7 +276,8 @@ impl Search<'_> {
     }
 
     /// Appends those of `candidates` that may contain the closest triangle of a point of the block; large ones are
-    /// replaced by their children, down to leaves if the block is not halved further.
+    /// replaced by their children, down to leaves if the block is not halved further. Returns the number of nodes whose
+    /// cylinders were examined.
     fn select(
         &mut self,
         block: &Block,
@@ -273,7 +285,7 @@ impl Search<'_> {
         moved: DVec3,
         candidates: Range<usize>,
         bound: &UpperBound,
-    ) {
+    ) -> usize {
         let count = block.count();
         let is_last = count <= SMALLEST;
         // Every second block keeps the bounds of the one it is half of.
@@ -282,6 +294,7 @@ impl Search<'_> {
         let coarse = COARSE * COARSE * across.sum::<f64>();
         let touching = bound.touching();
         let mut nodes = SmallVec::<[usize; 32]>::new();
+        let mut examined = 0;
         for k in candidates {
             let Candidate { node, distance, direction } = self.candidates[k];
             let distance = distance + moved.dot(direction);
@@ -294,6 +307,7 @@ impl Search<'_> {
             }
             nodes.push(node);
             while let Some(node) = nodes.pop() {
+                examined += 1;
                 let cylinder = self.tree.cylinder(node);
                 let from = cylinder.offset(centre);
                 let distance = from.length();
@@ -317,6 +331,7 @@ impl Search<'_> {
                 }
             }
         }
+        examined
     }
 }
 
@@ -364,8 +379,9 @@ impl Points {
         Self { block: *block, centre, origin, at, distances, fours: block.count().div_ceil(4) }
     }
 
-    /// Computes the distances from the leaves that are candidates from `begin` on, and writes them to the output.
-    fn search(mut self, search: &mut Search, begin: usize, bound: &UpperBound) {
+    /// Computes the distances from the leaves that are candidates from `begin` on, and writes them to the output. Pauses
+    /// meanwhile.
+    async fn search(mut self, search: &mut Search<'_>, begin: usize, bound: &UpperBound, pauses: &Pauses) {
         let packed_bound = PackedBound::new(bound);
         let candidates = &mut search.candidates[begin..];
         // The nearest first, so that most others are excluded.
@@ -373,14 +389,17 @@ impl Points {
         if let Some(first) = (0..candidates.len()).reduce(nearer) {
             candidates.swap(0, first);
         }
-        for candidate in candidates {
-            match search.tree.packed(candidate.node) {
-                Some(triangles) => {
-                    let count = search.tree.triangles_of(candidate.node).len();
-                    self.search_packed(triangles, count, &packed_bound);
+        for some in candidates.chunks(CANDIDATES_AT_ONCE) {
+            for candidate in some {
+                match search.tree.packed(candidate.node) {
+                    Some(triangles) => {
+                        let count = search.tree.triangles_of(candidate.node).len();
+                        self.search_packed(triangles, count, &packed_bound);
+                    }
+                    None => self.search_thin(search.tree, candidate.node, bound),
                 }
-                None => self.search_thin(search.tree, candidate.node, bound),
             }
+            pauses.after(some.len() / LEAVES_PER_UNIT).await;
         }
         for (k, index) in indices(&self.block).enumerate() {
             let [x, y, z] = [0, 1, 2].map(|axis| self.block.start[axis] + index[axis]);
@@ -497,7 +516,7 @@ mod tests {
     use crate::math::{DMat3, Random, triangle};
     use crate::mesh::Mesh;
     use crate::mesh::shapes::{cuboid, joined, soup, torus};
-    use crate::pauses::finished;
+    use crate::pauses::{advance, finished};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -562,6 +581,31 @@ mod tests {
     fn far_points_have_the_distance_of_the_closest_of_even_and_of_uneven_triangles() {
         check_far_points(0.0);
         check_far_points(0.4);
+    }
+
+    /// Where thousands of triangles are nearly the closest, a block takes as long as thousands do elsewhere.
+    #[test]
+    fn pauses_are_frequent_where_many_triangles_are_equally_far() {
+        let pauses_with = |copies: usize| {
+            let ball = Mesh::icosphere(Vec3::splat(8.0), 6.0, 0.6).unwrap().to_triangles();
+            let moved = |k: usize| {
+                let mut copy = ball.clone();
+                copy.positions.iter_mut().for_each(|p| *p += Vec3::splat(1e-4 * k as f32));
+                copy
+            };
+            let mesh = joined(&(0..copies).map(moved).collect::<Vec<_>>());
+            let pauses_on = |dims: [usize; 3]| {
+                let mut out = vec![0.0; dims.iter().product()];
+                let pauses = Pauses::default();
+                let mut distances =
+                    Box::pin(lattice_distances(&mesh, &DAffine3::IDENTITY, dims, &mut out, &pauses));
+                (0..).take_while(|_| advance(&mut distances).is_pending()).count()
+            };
+            // The hierarchy of triangles is made in slices, too.
+            pauses_on([16; 3]) - pauses_on([1; 3])
+        };
+        let [one, many] = [1, 60].map(pauses_with);
+        assert!(many > 15 * one.max(1), "{many} pauses with many, {one} with one");
     }
 
     /// Triangles thousands of times as long as the lattice, and as wide as a ten-thousandth of their length.

@@ -7,6 +7,7 @@ use super::sampling::Cell;
 use super::voxels::{VoxelNumber, Voxels, each};
 use super::{Normalisation, Region, Volume};
 use crate::math::Vec3;
+use crate::pauses::Pauses;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
@@ -204,14 +205,14 @@ impl FrameGrid {
     ///
     /// # Errors
     /// As [`Grid::reduce`].
-    pub(crate) fn reduce_along(
+    pub(crate) async fn reduce_along(
         &self,
         axes: [bool; 3],
         spacing: [f64; 3],
-        unit: f64,
-        factor: f64,
+        steps: [f64; 2],
+        pauses: &Pauses,
     ) -> Result<(Grid, [f64; 3]), VolumeError> {
-        pyramid::reduce_along(self.dims(), |z| Ok(self.slice(z)), axes, spacing, [unit, factor])
+        pyramid::reduce_along(self.dims(), |z| Ok(self.slice(z)), axes, spacing, steps, pauses).await
     }
 }
 
@@ -248,6 +249,7 @@ impl Volume {
 mod tests {
     use super::*;
     use crate::math::Random;
+    use crate::pauses::finished;
     use crate::volume::VolumeInit;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -289,8 +291,10 @@ mod tests {
                 assert_eq!(grid.part(region).unwrap(), stored.part(region).unwrap());
                 assert_eq!(grid.sobel().unwrap(), stored.sobel().unwrap());
                 let axes = [true, true, false];
-                let reduced = FrameGrid::from(stored.clone()).reduce_along(axes, [1.0; 3], 1.0, 1.7).unwrap();
-                assert_eq!(grid.reduce_along(axes, [1.0; 3], 1.0, 1.7).unwrap(), reduced);
+                let reduced = |grid: &FrameGrid| {
+                    finished(grid.reduce_along(axes, [1.0; 3], [1.0, 1.7], &Pauses::default())).unwrap()
+                };
+                assert_eq!(reduced(&grid), reduced(&stored.clone().into()));
                 let padding = Padding { background: 0.1, iso: 0.4 };
                 for _ in 0..200 {
                     let p = Vec3::from(DIMS.map(|n| ((n as f64 + 4.0) * random.unit() - 2.5) as f32));

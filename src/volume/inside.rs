@@ -1,6 +1,6 @@
 //! Voxelisation: which voxels are inside a closed surface.
 
-use super::row_sweep::{TRIANGLES_PER_UNIT, slices, span};
+use super::row_sweep::{TRIANGLES_AT_ONCE, TRIANGLES_PER_UNIT, slices, span};
 use crate::math::crossing::{crossing, is_beyond};
 use crate::math::order::{combined_rank, sort_ranks};
 use crate::math::{DVec2, DVec3};
@@ -32,21 +32,20 @@ impl FillRule {
 ///
 /// Exact, as [`visit_inside`].
 pub fn voxels_inside(surface: &TriangleMesh, dims: [usize; 3]) -> FixedBitSet {
+    finished(voxels_inside_in_slices(surface, dims, &Pauses::default()))
+}
+
+/// Does what [`voxels_inside`] does, and pauses meanwhile.
+pub async fn voxels_inside_in_slices(
+    surface: &TriangleMesh,
+    dims: [usize; 3],
+    pauses: &Pauses,
+) -> FixedBitSet {
     let positions: Vec<DVec3> = surface.positions.iter().map(|p| p.as_dvec3()).collect();
     let mut inside = FixedBitSet::with_capacity(dims.iter().product());
     let surface = (&positions[..], &surface.triangles[..]);
-    for_each_inside(surface, dims, FillRule::EvenOdd, |range| inside.insert_range(range));
+    visit_inside(surface, dims, FillRule::EvenOdd, |range| inside.insert_range(range), pauses).await;
     inside
-}
-
-/// Does what [`visit_inside`] does, without pauses.
-fn for_each_inside(
-    surface: (&[DVec3], &[[u32; 3]]),
-    dims: [usize; 3],
-    rule: FillRule,
-    visit: impl FnMut(Range<usize>),
-) {
-    finished(visit_inside(surface, dims, rule, visit, &Pauses::default()));
 }
 
 /// Calls `visit` with each run of voxels along x whose centres are inside a closed surface, as a range of voxel
@@ -56,7 +55,7 @@ fn for_each_inside(
 /// Exact: a line along each row of voxels is intersected with the triangles by exact predicates. A voxel centre on the
 /// surface counts as moved by an infinitesimal amount along x, y and z; see [`crossing`](crate::math::crossing). A
 /// surface is closed if its edges have equally many triangles in both directions; it may intersect itself.
-/// Pauses between slices.
+/// Pauses meanwhile.
 pub async fn visit_inside(
     surface: (&[DVec3], &[[u32; 3]]),
     dims: [usize; 3],
@@ -70,10 +69,15 @@ pub async fn visit_inside(
     while let Some((z, near)) = slices.next() {
         let mut tested = 0;
         for &t in near {
+            if tested >= TRIANGLES_AT_ONCE {
+                pauses.after(tested / TRIANGLES_PER_UNIT).await;
+                tested = 0;
+            }
+            tested += 1;
             let triangle = triangles[t as usize];
             let Some([first, last]) = span(positions, triangle, 1, 0.0, dims[1]) else { continue };
             let corners = triangle.map(|v| positions[v as usize]);
-            tested += (last - first + 1) as usize;
+            tested += (last - first) as usize;
             for y in first..=last {
                 let at = DVec2::new(y.into(), z as f64);
                 let crossing = crossing(corners, at);
@@ -174,6 +178,16 @@ mod tests {
     fn moved(mut surface: TriangleMesh, by: Vec3) -> TriangleMesh {
         surface.positions.iter_mut().for_each(|p| *p += by);
         surface
+    }
+
+    /// Does what [`visit_inside`] does, without pauses.
+    fn for_each_inside(
+        surface: (&[DVec3], &[[u32; 3]]),
+        dims: [usize; 3],
+        rule: FillRule,
+        visit: impl FnMut(Range<usize>),
+    ) {
+        finished(visit_inside(surface, dims, rule, visit, &Pauses::default()));
     }
 
     #[test]

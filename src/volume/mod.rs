@@ -64,7 +64,7 @@ pub use error::VolumeError;
 pub(crate) use error::filled;
 pub(crate) use frame_grid::FrameGrid;
 pub use grid::{CellCache, Grid, Padding, VectorGrid};
-pub use inside::{FillRule, visit_inside, voxels_inside};
+pub use inside::{FillRule, visit_inside, voxels_inside, voxels_inside_in_slices};
 pub use labels::LabelCount;
 pub(crate) use labels::listed;
 pub(crate) use near_iso::NotFinite;

@@ -12,6 +12,7 @@ use super::sampling::locate_f64;
 use super::voxels::Voxels;
 use super::{Grid, Region, Volume, VolumeInit};
 use crate::math::{DAffine3, DMat3, DVec3};
+use crate::pauses::{Pauses, finished};
 use std::ops::Range;
 
 /// The five weights of the Gaussian-like kernel by which each pyramid level is reduced to the next.
@@ -20,6 +21,12 @@ const KERNEL: [f64; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 
 /// The ratio of the largest absolute intensity to the span of all above which levels store differences. Those
 /// of `f32` between neighbouring numbers are then 1/65536 of the span at most.
 const COARSEST_SPAN: f64 = 256.0;
+
+/// The number of voxels that are resampled along an axis in a unit of work.
+const VOXELS_PER_UNIT: usize = 512;
+
+/// The number of rows that are resampled between pauses.
+const ROWS_AT_ONCE: usize = 64;
 
 impl Volume {
     /// Returns a pyramid of `levels` volumes: the first is this one, each of the others has ⌊n/ρ⌋ voxels along every
@@ -73,7 +80,7 @@ impl Volume {
         let mut voxels = filled(self.frames() * size, 0.0)?;
         for (frame, out) in voxels.chunks_exact_mut(size).enumerate() {
             let slice = |z| values((frame * nz + z) * nx * ny..(frame * nz + z + 1) * nx * ny);
-            resample(finer.dims(), &taps, slice, out)?;
+            finished(resample(finer.dims(), &taps, slice, out, &Pauses::default()))?;
         }
         let ratio = DVec3::from([0, 1, 2].map(|axis| self.dims[axis] as f64 / dims[axis] as f64));
         let index_map =
@@ -134,7 +141,8 @@ impl Grid {
     /// # Errors
     /// `factor` not in (1, 2], `spacing` or `unit` not positive and finite; [`VolumeError::TooLarge`].
     pub fn reduce(&self, spacing: [f64; 3], unit: f64, factor: f64) -> Result<(Grid, [f64; 3]), VolumeError> {
-        reduce_along(self.dims, |z| Ok(self.slice(z)), [true; 3], spacing, [unit, factor])
+        let (slice, pauses) = (|z| Ok(self.slice(z)), Pauses::default());
+        finished(reduce_along(self.dims, slice, [true; 3], spacing, [unit, factor], &pauses))
     }
 
     /// Updates `coarse`, which [`Self::reduce`] returned for this grid and the same `spacing`, `unit` and `factor`,
@@ -178,7 +186,7 @@ impl Grid {
         };
         let (to, from) = (region(to), region(from));
         let (part, taps) = (self.part(from)?, [x.weights, y.weights, z.weights]);
-        let part = resampled(from.dims, &taps, |z| Ok(part.slice(z)))?;
+        let part = finished(resampled(from.dims, &taps, |z| Ok(part.slice(z)), &Pauses::default()))?;
         coarse.overwrite(to, &part);
         Ok(Some(to))
     }
@@ -192,49 +200,59 @@ impl Grid {
 
 /// Returns the next coarser level and its spacing as [`Grid::reduce`] does, but with fewer voxels only along the axes that
 /// `axes` marks; it is smoothed along the others, too. `slice` returns the slices across z of the grid, of `dims` voxels; the
-/// last argument is `unit` and `factor`.
-pub(super) fn reduce_along<S: AsRef<[f32]>>(
+/// last but one argument is `unit` and `factor`. Pauses meanwhile.
+pub(super) async fn reduce_along<S: AsRef<[f32]>>(
     dims: [usize; 3],
     slice: impl Fn(usize) -> Result<S, VolumeError>,
     axes: [bool; 3],
     spacing: [f64; 3],
     steps: [f64; 2],
+    pauses: &Pauses,
 ) -> Result<(Grid, [f64; 3]), VolumeError> {
-    let coarse = resampled(dims, &reduction(dims, axes, spacing, steps)?, slice)?;
+    let coarse = resampled(dims, &reduction(dims, axes, spacing, steps)?, slice, pauses).await?;
     let spacing = spacing_of(spacing, dims, coarse.dims);
     Ok((coarse, spacing))
 }
 
 /// Returns the grid that [`resample`] makes of the slices of one of `dims`.
-fn resampled<S: AsRef<[f32]>>(
+async fn resampled<S: AsRef<[f32]>>(
     dims: [usize; 3],
     taps: &[ResamplingWeights; 3],
     slice: impl Fn(usize) -> Result<S, VolumeError>,
+    pauses: &Pauses,
 ) -> Result<Grid, VolumeError> {
     let coarse = [0, 1, 2].map(|axis| taps[axis].spans.len());
     let mut values = filled(coarse.iter().product(), 0.0)?;
-    resample(dims, taps, slice, &mut values)?;
+    resample(dims, taps, slice, &mut values, pauses).await?;
     Ok(Grid { dims: coarse, values })
 }
 
 /// Resamples a grid of `dims`, whose slices across z `slice` returns, with the weights `taps`, and adds the result to `out`.
 /// A slice at a time is resampled along x and y, and added to those of the result that depend on it: all of them at once
-/// would take more memory than the grid.
-fn resample<S: AsRef<[f32]>>(
+/// would take more memory than the grid. Pauses meanwhile.
+async fn resample<S: AsRef<[f32]>>(
     dims: [usize; 3],
     [x, y, z]: &[ResamplingWeights; 3],
     slice: impl Fn(usize) -> Result<S, VolumeError>,
     out: &mut [f32],
+    pauses: &Pauses,
 ) -> Result<(), VolumeError> {
     let size = x.spans.len() * y.spans.len();
     let (mut along_x, mut along_xy) = (reserve(x.spans.len() * dims[1])?, reserve(size)?);
     for k in 0..dims[2] {
         along_x.clear();
-        resample_rows(slice(k)?.as_ref(), dims[0], x, &mut along_x);
+        for rows in slice(k)?.as_ref().chunks(ROWS_AT_ONCE * dims[0]) {
+            resample_rows(rows, dims[0], x, &mut along_x);
+            pauses.after(1 + rows.len() / VOXELS_PER_UNIT).await;
+        }
         along_xy.clear();
-        blend_rows(&along_x, x.spans.len(), y, &mut along_xy);
+        for i in 0..y.spans.len() {
+            blend_rows(&along_x, x.spans.len(), y.of(i), &mut along_xy);
+            pauses.after(x.spans.len() / VOXELS_PER_UNIT).await;
+        }
         for (i, weight) in z.depending_on(k) {
             add_scaled(&mut out[i * size..], &along_xy, weight);
+            pauses.after(size / VOXELS_PER_UNIT).await;
         }
     }
     Ok(())
@@ -250,15 +268,12 @@ fn resample_rows(values: &[f32], nx: usize, taps: &ResamplingWeights, out: &mut 
     }
 }
 
-/// Blends rows of `nx` values with the weights `taps`, and appends the resulting rows to `out`.
-fn blend_rows(values: &[f32], nx: usize, taps: &ResamplingWeights, out: &mut Vec<f32>) {
-    for i in 0..taps.spans.len() {
-        let start = out.len();
-        out.resize(start + nx, 0.0);
-        let (first, weights) = taps.of(i);
-        for (row, &weight) in values.chunks_exact(nx).skip(first).zip(weights) {
-            add_scaled(&mut out[start..], row, weight);
-        }
+/// Blends rows of `nx` values, from the row `first` on, with `weights`, and appends the resulting row to `out`.
+fn blend_rows(values: &[f32], nx: usize, (first, weights): (usize, &[f32]), out: &mut Vec<f32>) {
+    let start = out.len();
+    out.resize(start + nx, 0.0);
+    for (row, &weight) in values.chunks_exact(nx).skip(first).zip(weights) {
+        add_scaled(&mut out[start..], row, weight);
     }
 }
 

@@ -5,7 +5,7 @@ use crate::pauses::Pauses;
 
 /// Calls `visit` for each row of voxels along x that a triangle may reach, rows in order: with y and z of the row and
 /// the indices of the triangles whose bounding boxes come within `reach` voxels of it, in a deterministic order. Pauses
-/// between slices. `positions` are in voxel indices; `dims` are the dimensions of the grid.
+/// meanwhile. `positions` are in voxel indices; `dims` are the dimensions of the grid.
 ///
 /// Memory is linear in the number of triangles and in that of slices and rows of a slice, whatever else the size of the
 /// grid.
@@ -23,6 +23,10 @@ pub(super) async fn for_each_row(
         while let Some((y, in_row)) = rows.next() {
             visit(y, z, in_row);
             tested += in_row.len();
+            if tested >= TRIANGLES_AT_ONCE {
+                pauses.after(tested / TRIANGLES_PER_UNIT).await;
+                tested = 0;
+            }
         }
         pauses.after(1 + tested / TRIANGLES_PER_UNIT).await;
     }
@@ -30,6 +34,9 @@ pub(super) async fn for_each_row(
 
 /// Triangles in rows of voxels that are a unit of work.
 pub(super) const TRIANGLES_PER_UNIT: usize = 32;
+
+/// The number of triangles in rows of voxels that are visited between pauses.
+pub(super) const TRIANGLES_AT_ONCE: usize = 64 * TRIANGLES_PER_UNIT;
 
 /// Returns those of `count` slices across z that a triangle may reach, in order: z and the indices of the triangles whose
 /// bounding boxes come within `reach` voxels of it, in a deterministic order.

@@ -772,6 +772,19 @@ fn a_model_made_in_slices_is_the_same() {
     }
 }
 
+/// Reading a large image takes longer than all else at the beginning.
+#[test]
+fn the_pyramid_of_a_large_image_is_made_in_slices() {
+    let side = 128;
+    let voxels = Voxels::U8((0..side * side * side).map(|k| u8::from(k > side * side * side / 2)).collect());
+    let volume = Volume::new(VolumeInit::new(voxels, [side, side, side, 1])).unwrap();
+    let start = Start::Seeds { points: vec![DVec3::splat(64.0)], radius: 12.0 };
+    let options = DeformableOptions { levels: 3, start, ..Default::default() };
+    let (model, slices) = in_slices(DeformableModel::begin(&volume, options).unwrap());
+    assert!(model.is_ok());
+    assert!(slices > 30, "{slices}");
+}
+
 /// Two bright balls in a dim one.
 fn nested() -> Volume {
     let value = |p: Vec3| {

@@ -2,7 +2,8 @@
 //!
 //! A copy of the whole state before each step would make steps in which little moves several times as long. So the state is
 //! copied now and then, once the steps since the last copy have done much more work than a copy takes. Where a step is given
-//! up, the model is set back to the copy, and makes the steps again that had ended since; they have the same bits.
+//! up, the model is set back to the copy, and makes the steps again that had ended since; they have the same bits. That is
+//! not interrupted, so it must not be much work.
 
 use super::DeformableModel;
 use super::motion::{Motion, SpeedSummary};
@@ -12,12 +13,11 @@ use crate::methods::{MethodError, StepReport};
 use crate::pauses::{Pauses, finished};
 use crate::remesh::{Changes, Pending, Resolver};
 
-/// The work, in units per vertex, after which the state is copied again. With less, copies take a larger share of the time;
-/// with more, steps that are made again take longer.
-const WORK_PER_VERTEX: f64 = 3.0;
-
-/// The least work, in units, after which the state is copied again: about ten milliseconds.
-const LEAST_WORK: u64 = 4000;
+/// The work, in units, after which the state is copied again, at least: about ten milliseconds, and per vertex. A copy takes
+/// about a hundredth of a unit per vertex. With less work, copies take a larger share of the time; with more, steps that are
+/// made again take longer.
+const LEAST_WORK: f64 = 4000.0;
+const WORK_PER_VERTEX: f64 = 0.2;
 
 /// The state before a step, and what has been done since.
 #[derive(Clone, Debug)]
@@ -84,8 +84,8 @@ impl DeformableModel {
 
     /// Returns the present state, or the last copy if little has been done since.
     fn next_checkpoint(&mut self) -> Box<Checkpoint> {
-        let most = (WORK_PER_VERTEX * self.mesh.vertex_count() as f64) as u64;
-        match self.checkpoint.take().filter(|last| last.work < most.max(LEAST_WORK)) {
+        let most = LEAST_WORK.max(WORK_PER_VERTEX * self.mesh.vertex_count() as f64);
+        match self.checkpoint.take().filter(|last| (last.work as f64) < most) {
             Some(last) => last,
             None => Box::new(Checkpoint {
                 mesh: self.mesh.clone(),
@@ -198,6 +198,23 @@ mod tests {
             }
         }
         assert!(given_up > 30, "{given_up} steps were given up");
+    }
+
+    /// Giving a step up is not interrupted.
+    #[test]
+    fn the_steps_since_the_last_copy_are_little_work() {
+        let mut model = model();
+        let (mut steps, mut made_again) = (0, 0);
+        while steps < 60 && slices(&mut model, usize::MAX).is_some_and(|report| !report.done) {
+            assert!(slices(&mut model, 1).is_none());
+            let Some(checkpoint) = &model.checkpoint else { panic!("a step is under way") };
+            let most = 4500.0 + 0.25 * model.mesh.vertex_count() as f64;
+            assert!((checkpoint.work as f64) < most, "{} units, {steps} steps", checkpoint.work);
+            made_again += checkpoint.steps - 1;
+            model.discard_step();
+            steps += 1;
+        }
+        assert!(steps > 20 && made_again > 0, "{steps} steps, {made_again} made again");
     }
 
     /// Several steps are made again after one was given up, and none of those before a change of the model.

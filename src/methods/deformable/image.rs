@@ -429,11 +429,9 @@ impl Pyramid {
         let pass = volume.dims().iter().product::<usize>() / VOXELS_PER_UNIT + 1;
         let grid = volume.frame_grid(volume.range(), frame)?;
         pauses.after(pass).await;
-        let hash = hash_of(&grid, Region { min: [0; 3], dims: volume.dims() });
+        let (hash, is_flat) = hash_and_flatness(&grid, pauses).await;
         let volume_range = [volume.range()[0], volume.span()];
         let divided = [0, 1, 2].map(|axis| grid.dims()[axis] * parts[axis]);
-        let is_flat = grid.parts(BLOCK).all(|part| part.iter().all(|&value| value == grid.value(0)));
-        pauses.after(pass).await;
         let mut pyramid = Self {
             levels: vec![LevelImage::new(grid, parts, divided)],
             spacing: volume.spacing(),
@@ -458,8 +456,7 @@ impl Pyramid {
         }
         pauses.after(pass).await;
         pyramid.set_not_finite(params)?;
-        pyramid.build_levels(above)?;
-        pauses.after(pass).await;
+        pyramid.build_levels(above, pauses).await?;
         Ok(pyramid)
     }
 
@@ -490,7 +487,7 @@ impl Pyramid {
             ..*self
         };
         adapted.set_not_finite(params)?;
-        adapted.build_levels(above)?;
+        finished(adapted.build_levels(above, &Pauses::default()))?;
         Ok(Some(adapted))
     }
 
@@ -523,8 +520,8 @@ impl Pyramid {
         Ok(())
     }
 
-    /// Makes `above` levels from the finest, the only one.
-    fn build_levels(&mut self, above: usize) -> Result<(), MethodError> {
+    /// Makes `above` levels from the finest, the only one. Pauses meanwhile.
+    async fn build_levels(&mut self, above: usize, pauses: &Pauses) -> Result<(), MethodError> {
         let mut spacing = self.spacing;
         let mut unit = spacing.into_iter().fold(f64::INFINITY, f64::min);
         let finest = self.dims();
@@ -532,7 +529,8 @@ impl Pyramid {
         for level in 0..above {
             let grid = &self.levels[level].grid;
             let along = level_parts.map(|n| n == 1);
-            let (coarse, coarse_spacing) = grid.reduce_along(along, spacing, unit, REDUCTION)?;
+            let (coarse, coarse_spacing) =
+                grid.reduce_along(along, spacing, [unit, REDUCTION], pauses).await?;
             level_parts = parts_on_coarse_level(self.parts, coarse_spacing, coarse.dims);
             self.levels.push(LevelImage::new(coarse, level_parts, finest));
             spacing = coarse_spacing;
@@ -812,6 +810,19 @@ fn hash_of(grid: &FrameGrid, region: Region) -> u64 {
         let values = grid.values_in(row.clone(), &mut buffer);
         row.zip(values).fold(sum, |sum: u64, (k, &value)| sum.wrapping_add(hash_of_voxel(k, value)))
     })
+}
+
+/// Returns the hash of all voxels of a grid, as [`hash_of`], and whether they have the same intensity. Pauses meanwhile.
+async fn hash_and_flatness(grid: &FrameGrid, pauses: &Pauses) -> (u64, bool) {
+    let (first, mut hash, mut is_flat) = (grid.value(0), 0u64, true);
+    for (k, part) in grid.parts(BLOCK).enumerate() {
+        is_flat &= part.iter().all(|&value| value == first);
+        for (k, &value) in (k * BLOCK..).zip(part.iter()) {
+            hash = hash.wrapping_add(hash_of_voxel(k, value));
+        }
+        pauses.after(1 + part.len() / VOXELS_PER_UNIT).await;
+    }
+    (hash, is_flat)
 }
 
 /// Returns the hash of one voxel, given its index in the grid and its intensity. The hashes of an image are added up, so

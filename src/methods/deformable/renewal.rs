@@ -49,6 +49,7 @@ impl DeformableModel {
         pauses.now().await;
         let delta = self.pyramid.delta_at(self.finest_delta, level);
         let added = simplified(added, image, delta, pauses).await;
+        pauses.now().await;
         Ok(Renewal { removed, added: Mesh::from_triangles(&added)? })
     }
 

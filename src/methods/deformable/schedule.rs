@@ -34,6 +34,9 @@ const MAX_SEARCHES: u32 = 3;
 /// steps it is stricter than [`SETTLED_SPEED`].
 const SETTLED_DISPLACEMENT: f32 = 0.1;
 
+/// The number of removed vertices that count as a unit of work.
+const REMOVED_PER_UNIT: usize = 64;
+
 /// The state of convergence on the current pyramid level, which decides when the level ends; part of a saved run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Convergence {
@@ -234,6 +237,7 @@ impl DeformableModel {
     async fn descend(&mut self, times: &mut Times, pauses: &Pauses) -> Result<Changes, MethodError> {
         let begin = (self.clock)();
         let renewal = if self.seeds_levels() { self.renewal(pauses).await? } else { Renewal::default() };
+        pauses.now().await;
         let seeds = renewal.added.component_count() as u32;
         let is_renewed = seeds > 0 && self.try_to_renew(&renewal, pauses).await;
         times.add("renewal", (self.clock)() - begin);
@@ -242,7 +246,9 @@ impl DeformableModel {
         }
         let room = if self.pyramid.is_sparse() { self.expected_below() } else { 0 };
         self.descend_refined(pauses).await?;
+        pauses.now().await;
         self.resolver.reorder(&mut self.mesh, room);
+        pauses.now().await;
         self.mark_checked();
         pauses.now().await;
         let mut changes = self.check_everything(times, pauses).await;
@@ -272,11 +278,16 @@ impl DeformableModel {
     /// # Errors
     /// If there would be too many vertices, the result intersects itself, or memory does not suffice.
     async fn descend_renewed(&mut self, renewal: &Renewal, pauses: &Pauses) -> Result<(), MethodError> {
-        renewal.removed.iter().for_each(|&v| _ = self.mesh.remove_component(v));
+        for &v in &renewal.removed {
+            let vertices = self.mesh.remove_component(v);
+            pauses.after(1 + vertices / REMOVED_PER_UNIT).await;
+        }
+        pauses.now().await;
         self.descend_refined(pauses).await?;
         self.check_vertex_limit(&renewal.added)?;
         let added = self.mesh.append(&renewal.added)?;
         self.initialise_attributes(&added);
+        pauses.now().await;
         self.resolve_contour(pauses).await?;
         self.mark_checked();
         Ok(())

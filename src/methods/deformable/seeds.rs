@@ -15,7 +15,7 @@ use crate::methods::{MethodError, StepReport, Times};
 use crate::pauses::{Pauses, finished};
 use crate::remesh::Changes;
 use crate::spatial::{CellSet, TriangleTree};
-use crate::volume::{Grid, Subdivided, marching_cubes, voxels_inside};
+use crate::volume::{Grid, Subdivided, marching_cubes, voxels_inside_in_slices};
 use fixedbitset::FixedBitSet;
 
 /// The distance from the mesh, in voxels of the pyramid level, beyond which voxels on the wrong side of it are missing,
@@ -153,10 +153,11 @@ impl DeformableModel {
         // The contour, in a large image the larger of the two meshes, is freed before the other is made.
         let contour = contour(image, self.contour_rule(self.level_iso), pauses).await?;
         pauses.now().await;
-        let in_contour = voxels_inside(&indexed(contour), dims);
+        let in_contour = voxels_inside_in_slices(&indexed(contour), dims, pauses).await;
         pauses.now().await;
         let surface = indexed(self.mesh.to_triangles());
-        let in_mesh = voxels_inside(&surface, dims);
+        pauses.now().await;
+        let in_mesh = voxels_inside_in_slices(&surface, dims, pauses).await;
         let comparison = Comparison { image, iso: self.level_iso, object, in_contour, in_mesh, surface };
         let smallest = SMALLEST_SEED * self.smallest_part();
         pauses.now().await;
@@ -228,7 +229,10 @@ impl Comparison<'_> {
         let dims = self.grid().dims();
         let mut cells = CellSet::new(CLEARANCE as f32 + longest_edge(&self.surface));
         missing.iter().for_each(|&voxel| cells.insert_around(coordinates(dims, voxel)));
-        let tree = TriangleTree::in_slices(&self.surface_near(&cells), pauses).await?;
+        pauses.now().await;
+        let surface = self.surface_near(&cells);
+        pauses.now().await;
+        let tree = TriangleTree::in_slices(&surface, pauses).await?;
         let mut far = Vec::new();
         for voxel in missing {
             pauses.after(1).await;
