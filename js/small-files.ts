@@ -40,6 +40,15 @@ export function limitOfSmall(help = STORE_PLAIN): string {
  */
 export const MOST_VERTICES_OF_SMALL = 300_000;
 
+/** Most vertices of a tracked surface in an image of small files, unless its maker allows more, for the same reason. */
+export const MOST_TRACKED_OF_SMALL = 200_000;
+
+/**
+ * Most voxels of the box that a surface is tracked in, in an image of small files, unless its maker allows more: finding
+ * what is bright in it takes about half a gigabyte.
+ */
+export const MOST_VOXELS_OF_SMALL = 8_000_000;
+
 /** Property of voxels and volumes that come from small files; the same in all entry points. */
 const OF_SMALL = Symbol.for('vesicle of small files');
 

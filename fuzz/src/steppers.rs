@@ -14,7 +14,7 @@ use vesicle::methods::multires::{
     ControlEllipsoid, Energy, MultiresOptions, MultiresParams, MultiresolutionModel, Topology,
 };
 use vesicle::methods::tracking::{
-    Bounds, Cavity, Component, SurfaceTracker, TrackingOptions, TrackingParams,
+    Bounds, Cavity, Component, SurfaceTracker, TrackingLimits, TrackingOptions, TrackingParams,
 };
 use vesicle::methods::{Auto, MethodError, deformable};
 use vesicle::volume::{Volume, VolumeInit, Voxels};
@@ -367,8 +367,15 @@ pub fn tracking(data: &[u8]) {
     let start = bytes.chance(5).then(|| shape(bytes));
     let parts = start.as_ref().map_or(1, |mesh| measure(mesh).components);
     let cavity = if bytes.chance(2) { Cavity::Closed } else { Cavity::Open };
-    let options =
-        TrackingOptions { volume, bounds, component, start, cavity, params: tracking_params(bytes) };
+    let options = TrackingOptions {
+        volume,
+        bounds,
+        component,
+        start,
+        cavity,
+        limits: TrackingLimits::default(),
+        params: tracking_params(bytes),
+    };
     let Ok(mut tracker) = SurfaceTracker::new(options) else { return };
     for _ in 0..200 {
         if tracker.is_done() || tracker.step().is_err() {
@@ -486,6 +493,7 @@ pub fn small_tracking() -> SurfaceTracker {
         component: Component::Largest,
         start: None,
         cavity: Cavity::Open,
+        limits: TrackingLimits::default(),
         params: TrackingParams::default(),
     };
     SurfaceTracker::new(options).unwrap()
