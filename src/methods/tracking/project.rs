@@ -99,6 +99,7 @@ mod tests {
     use super::super::working_space::WorkingSpace;
     use super::*;
     use crate::math::DAffine3;
+    use crate::pauses::{Pauses, finished};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
