@@ -22,7 +22,7 @@ use vesicle::io::parse_volume;
 use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::{count_self_intersections, measure};
 use vesicle::methods::tracking::{
-    Bounds, Cavity, Component, Query, SurfaceTracker, TrackingOptions, TrackingParams,
+    Bounds, Cavity, Component, Query, SurfaceTracker, TrackingLimits, TrackingOptions, TrackingParams,
 };
 use vesicle::spatial::surface_distance;
 use vesicle::volume::{Enrichment, Space, Volume, VolumeInit, Voxels};
@@ -100,6 +100,7 @@ fn track(cine: &Cine) {
         component: Component::Largest,
         start: None,
         cavity: Cavity::Open,
+        limits: TrackingLimits::default(),
         params,
     };
     let mut tracker = SurfaceTracker::new(options).unwrap();
@@ -222,6 +223,7 @@ fn track_file(volume: &Volume, voxel: DVec3, reach: f64) {
         component,
         start: None,
         cavity: Cavity::Open,
+        limits: TrackingLimits::default(),
         params,
     })
     .unwrap();
@@ -273,6 +275,7 @@ fn track_proposed(volume: &Volume, voxel: Option<DVec3>) {
         } else {
             Cavity::Closed
         },
+        limits: TrackingLimits::default(),
         params: TrackingParams { threshold, cyclic: true, ..TrackingParams::default() },
     };
     let mut tracker = SurfaceTracker::new(options).unwrap();

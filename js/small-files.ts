@@ -49,6 +49,15 @@ export const MOST_LABEL_VERTICES_OF_SMALL = 1_000_000;
 /** Most bytes that slices between those of an image of small files may take, with the work on them. */
 export const MOST_ENRICHED_OF_SMALL = 384 * 2 ** 20;
 
+/** Most vertices of a tracked surface in an image of small files, unless its maker allows more, for the same reason. */
+export const MOST_TRACKED_OF_SMALL = 200_000;
+
+/**
+ * Most voxels of the box that a surface is tracked in, in an image of small files, unless its maker allows more: finding
+ * what is bright in it takes about half a gigabyte.
+ */
+export const MOST_VOXELS_OF_SMALL = 8_000_000;
+
 /** Property of voxels and volumes that come from small files; the same in all entry points. */
 const OF_SMALL = Symbol.for('vesicle of small files');
 

@@ -3,6 +3,7 @@ import type { SpaceOptions, Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { checkedSpaceOptions, frameOf, type MeshFrame, SPACE_OPTIONS } from './mesh-file.js';
 import { Handle } from './runtime.js';
+import { isOfSmall, MOST_TRACKED_OF_SMALL, MOST_VOXELS_OF_SMALL } from './small-files.js';
 import {
   checkedSlices,
   Runner,
@@ -12,7 +13,7 @@ import {
   type Stepper,
   type StepReport,
 } from './stepper.js';
-import { RawProposal, RawTracker, RawTrackerCreation, TriangleCopy } from './vesicle.js';
+import { RawProposal, RawTracker, RawTrackerCreation, RawTrackingOptions, TriangleCopy } from './vesicle.js';
 import { type Volume, volumeHandle } from './volume.js';
 import { ModelWarnings, notesOf } from './warnings.js';
 
@@ -86,6 +87,19 @@ export interface TrackingOptions {
    * saved before there was a choice are `'open'`.
    */
   cavity?: 'closed' | 'open';
+  /**
+   * Largest number of vertices of the surface; a run that would exceed it fails with `too-large`. By default, and at most,
+   * 4 million, or 200,000 by default if the files of the volume have at most 128 KiB, all together: these may come from
+   * anyone and unpack to a lattice of any size. The contour of all objects in the box, which the surface is chosen from,
+   * has at most eight times as many triangles.
+   */
+  maxVertices?: number;
+  /**
+   * Largest number of voxels of the box in one frame, with two more on every side; steps in a larger one fail with
+   * `too-large`. All frames together have at most eight times as many, and their boundary as many points. By default as many as fit into memory, or
+   * 8 million if the files of the volume have at most 128 KiB, all together.
+   */
+  maxVoxels?: number;
   /** Initial parameters: any subset; the others have their defaults, some of which are derived from the volume. */
   params?: TrackingParams;
 }
@@ -155,7 +169,7 @@ interface Statistics {
   frames: FrameStatistics[];
 }
 
-const OPTIONS = ['volume', 'box', 'voxels', 'component', 'start', 'cavity', 'params'];
+const OPTIONS = ['volume', 'box', 'voxels', 'component', 'start', 'cavity', 'maxVertices', 'maxVoxels', 'params'];
 
 /** Duration of a frame in {@link SurfaceTracker.toGlb}, seconds, for volumes that do not define it. */
 const FRAME_SECONDS = 0.1;
@@ -195,13 +209,13 @@ export class SurfaceTracker implements Stepper {
    *   2 or less than three times the shortest side of a voxel, such as a single slice, slices more than 12.5 pixels apart
    *   without a given `radius`, a box outside of it, a start that is empty, inside out, outside the box or with a mean edge
    *   below a tenth of a voxel; `not-closed`, `self-intersecting` for a start that is;
-   *   `too-large`.
+   *   `too-large`, also for a start with more than `maxVertices`.
    */
   constructor(given: TrackingOptions) {
     const created = given instanceof Created ? given : undefined;
     const known = created ? created.options : checked(given);
     this.#frameSeconds = volumeHandle('volume', known.volume).use((raw) => raw.frameSeconds()) || FRAME_SECONDS;
-    const make = () => beginning(known, (...of) => new RawTracker(...of));
+    const make = () => beginning(known, (of) => new RawTracker(of));
     this.#handle = created ? created.handle : new Handle('SurfaceTracker', make());
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     this.#warnings = new ModelWarnings(known.volume.warnings, known.start?.warnings);
@@ -222,7 +236,7 @@ export class SurfaceTracker implements Stepper {
     const known = checked(given);
     const creation = new Handle(
       'SurfaceTracker',
-      beginning(known, (...of) => new RawTrackerCreation(...of)),
+      beginning(known, (of) => new RawTrackerCreation(of)),
     );
     try {
       const raw = await runInSlices(() => creation.use((one) => one.advance()), signal, budgetMs);
@@ -499,17 +513,29 @@ class Created {
 }
 
 function checked(given: TrackingOptions): TrackingOptions {
-  return checkProperties('options', given, OPTIONS) as TrackingOptions;
+  const known = checkProperties('options', given, OPTIONS) as TrackingOptions;
+  for (const name of ['maxVertices', 'maxVoxels'] as const) {
+    if (known[name] !== undefined) integer(name, known[name], { min: 1 });
+  }
+  return known;
 }
 
 /** Returns a function that makes what needs the arguments of a tracker. */
-function beginning<T>(options: TrackingOptions, make: (...of: ConstructorParameters<typeof RawTracker>) => T): () => T {
+function beginning<T>(options: TrackingOptions, make: (of: RawTrackingOptions) => T): () => T {
   const image = volumeHandle('volume', options.volume);
   const [box, voxels, nearest] = [corners(options.box), ends(options.voxels), point(options.component)];
   if (box && voxels) throw invalid('voxels', 'give either box or voxels, not both');
   const params = shallowCopy('params', options.params ?? {});
   const isClosed = isClosedCavity(options.cavity);
-  return () => image.use((raw) => make(raw, box, voxels, nearest, triangles(options.start), isClosed, params));
+  const ofSmall = isOfSmall(options.volume);
+  const maxVertices = options.maxVertices ?? (ofSmall ? MOST_TRACKED_OF_SMALL : undefined);
+  const maxVoxels = options.maxVoxels ?? (ofSmall ? MOST_VOXELS_OF_SMALL : undefined);
+  return () =>
+    image.use((raw) => {
+      const of = new RawTrackingOptions(raw, box, voxels, nearest, triangles(options.start), isClosed, params);
+      of.setLimits(maxVertices, maxVoxels);
+      return make(of);
+    });
 }
 
 function isClosedCavity(cavity: TrackingOptions['cavity']): boolean {

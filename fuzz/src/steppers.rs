@@ -14,7 +14,7 @@ use vesicle::methods::multires::{
     ControlEllipsoid, Energy, MultiresOptions, MultiresParams, MultiresolutionModel, Topology,
 };
 use vesicle::methods::tracking::{
-    Bounds, Cavity, Component, SurfaceTracker, TrackingOptions, TrackingParams,
+    Bounds, Cavity, Component, SurfaceTracker, TrackingLimits, TrackingOptions, TrackingParams,
 };
 use vesicle::methods::{Auto, MethodError, deformable};
 use vesicle::volume::{Volume, VolumeError, VolumeInit, Voxels};
@@ -77,6 +77,7 @@ pub fn deformable(data: &[u8]) {
         start: start(bytes, &volume),
         levels: bytes.below(3),
         edge: bytes.chance(2).then(|| bytes.within(0.8, 4.0)),
+        max_vertices: None,
         params: Some(deformable_params(bytes, &volume)),
         max_vertices: bytes.chance(4).then(|| 20 + bytes.below(1000)),
     };
@@ -371,8 +372,15 @@ pub fn tracking(data: &[u8]) {
     let start = bytes.chance(5).then(|| shape(bytes));
     let parts = start.as_ref().map_or(1, |mesh| measure(mesh).components);
     let cavity = if bytes.chance(2) { Cavity::Closed } else { Cavity::Open };
-    let options =
-        TrackingOptions { volume, bounds, component, start, cavity, params: tracking_params(bytes) };
+    let options = TrackingOptions {
+        volume,
+        bounds,
+        component,
+        start,
+        cavity,
+        limits: TrackingLimits::default(),
+        params: tracking_params(bytes),
+    };
     let Ok(mut tracker) = SurfaceTracker::new(options) else { return };
     for _ in 0..200 {
         if tracker.is_done() || tracker.step().is_err() {
@@ -490,6 +498,7 @@ pub fn small_tracking() -> SurfaceTracker {
         component: Component::Largest,
         start: None,
         cavity: Cavity::Open,
+        limits: TrackingLimits::default(),
         params: TrackingParams::default(),
     };
     SurfaceTracker::new(options).unwrap()

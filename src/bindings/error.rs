@@ -100,7 +100,9 @@ impl From<MethodError> for Failure {
         match error {
             MethodError::Mesh(error) => error.into(),
             MethodError::Volume(error) => error.into(),
-            MethodError::TooManyVertices { .. } => Self::new("too-large", error.to_string()),
+            MethodError::TooManyVertices { .. } | MethodError::TooLarge { .. } => {
+                Self::new("too-large", error.to_string())
+            }
             MethodError::Singular { .. } => Self::new("singular-system", error.to_string()),
             MethodError::NeedsData { .. } => Self::new("needs-data", error.to_string()),
             MethodError::BadState { .. } => Self::new("bad-file", error.to_string()),

@@ -18,8 +18,8 @@ use super::volume::RawVolume;
 use vesicle::io::AnimationWriter;
 use vesicle::math::DVec3;
 use vesicle::methods::tracking::{
-    Bounds, Cavity, Component, FrameStatistics, Proposal, Query, SurfaceTracker, TrackingOptions,
-    TrackingParams,
+    Bounds, Cavity, Component, FrameStatistics, Proposal, Query, SurfaceTracker, TrackingLimits,
+    TrackingOptions, TrackingParams,
 };
 use vesicle::methods::{Method, MethodError, StepReport};
 use vesicle::pauses::{Computation, advance};
@@ -108,28 +108,47 @@ impl From<Proposal> for ProposalCopy {
     }
 }
 
-/// Options of a tracker from the arguments of its constructor.
-fn options(
-    volume: &RawVolume,
-    corners: Option<Float64Array>,
-    voxels: Option<Vec<u32>>,
-    nearest: Option<Float64Array>,
-    start: Option<TriangleCopy>,
-    is_closed: bool,
-    params: &JsValue,
-) -> Result<TrackingOptions, JsValue> {
-    let numbers = |array: Option<Float64Array>| array.as_ref().map(doubles).transpose();
-    let world = |n: Vec<f64>| Bounds::World([DVec3::from_slice(&n), DVec3::from_slice(&n[3..])]);
-    let within = |n: Vec<u32>| Bounds::Voxels([0, 3].map(|k| [k, k + 1, k + 2].map(|i| n[i] as usize)));
-    Ok(TrackingOptions {
-        volume: volume.0.clone(),
-        bounds: numbers(corners)?.map(world).or(voxels.map(within)),
-        component: numbers(nearest)?
-            .map_or(Component::Largest, |n| Component::Nearest(DVec3::from_slice(&n))),
-        start: start.map(|mesh| mesh.0),
-        cavity: if is_closed { Cavity::Closed } else { Cavity::Open },
-        params: with_overrides(&TrackingParams::default(), params)?,
-    })
+/// Options of a tracker.
+#[wasm_bindgen]
+pub struct RawTrackingOptions(TrackingOptions);
+
+#[wasm_bindgen]
+impl RawTrackingOptions {
+    /// Creates options for a 4D volume. The region processed is a box given by two opposite `corners` in world space, else by
+    /// its first and last voxel, `voxels` (six numbers each), else the whole volume. The surface tracked is the component
+    /// that contains the point `nearest`, in world space, or has the vertex nearest to it; without that point, the one that
+    /// encloses the largest volume. `start` is the surface in the first frame, by default extracted from the image. With
+    /// `is_closed`, muscles within a cavity count as blood. Properties of `params` replace the default parameters.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        volume: &RawVolume,
+        corners: Option<Float64Array>,
+        voxels: Option<Vec<u32>>,
+        nearest: Option<Float64Array>,
+        start: Option<TriangleCopy>,
+        is_closed: bool,
+        params: &JsValue,
+    ) -> Result<RawTrackingOptions, JsValue> {
+        let numbers = |array: Option<Float64Array>| array.as_ref().map(doubles).transpose();
+        let world = |n: Vec<f64>| Bounds::World([DVec3::from_slice(&n), DVec3::from_slice(&n[3..])]);
+        let within = |n: Vec<u32>| Bounds::Voxels([0, 3].map(|k| [k, k + 1, k + 2].map(|i| n[i] as usize)));
+        Ok(RawTrackingOptions(TrackingOptions {
+            volume: volume.0.clone(),
+            bounds: numbers(corners)?.map(world).or(voxels.map(within)),
+            component: numbers(nearest)?
+                .map_or(Component::Largest, |n| Component::Nearest(DVec3::from_slice(&n))),
+            start: start.map(|mesh| mesh.0),
+            cavity: if is_closed { Cavity::Closed } else { Cavity::Open },
+            limits: TrackingLimits::default(),
+            params: with_overrides(&TrackingParams::default(), params)?,
+        }))
+    }
+
+    /// Sets the largest numbers of vertices and of voxels.
+    #[wasm_bindgen(js_name = setLimits)]
+    pub fn set_limits(&mut self, max_vertices: Option<usize>, max_voxels: Option<usize>) {
+        self.0.limits = TrackingLimits { max_vertices, max_voxels };
+    }
 }
 
 /// A tracker that is being created in slices.
@@ -140,17 +159,8 @@ pub struct RawTrackerCreation(Computation<Result<SurfaceTracker, MethodError>>);
 impl RawTrackerCreation {
     /// Begins to create the tracker that the constructor of `RawTracker` creates.
     #[wasm_bindgen(constructor)]
-    pub fn new(
-        volume: &RawVolume,
-        corners: Option<Float64Array>,
-        voxels: Option<Vec<u32>>,
-        nearest: Option<Float64Array>,
-        start: Option<TriangleCopy>,
-        is_closed: bool,
-        params: &JsValue,
-    ) -> Result<RawTrackerCreation, JsValue> {
-        let options = options(volume, corners, voxels, nearest, start, is_closed, params)?;
-        Ok(RawTrackerCreation(Box::pin(SurfaceTracker::new_in_slices(options))))
+    pub fn new(options: RawTrackingOptions) -> RawTrackerCreation {
+        RawTrackerCreation(Box::pin(SurfaceTracker::new_in_slices(options.0)))
     }
 
     /// Does a slice of the work; returns the tracker at the end, after which this must not be called any more.
@@ -168,23 +178,10 @@ pub struct RawTracker(Rc<Stepping<SurfaceTracker>>);
 
 #[wasm_bindgen]
 impl RawTracker {
-    /// Creates a tracker of a surface through the frames of a 4D volume. The region processed is a box given by two
-    /// opposite `corners` in world space, else by its first and last voxel, `voxels` (six numbers each), else the whole
-    /// volume. The surface tracked is the component that contains the point `nearest`, in world space, or has the
-    /// vertex nearest to it; without that point, the one that encloses the largest volume. `start` is the surface in
-    /// the first frame, by default extracted from the image. With `is_closed`, muscles within a cavity count as blood. Properties of `params` replace the default parameters.
+    /// Creates a tracker of a surface through the frames of a 4D volume.
     #[wasm_bindgen(constructor)]
-    pub fn new(
-        volume: &RawVolume,
-        corners: Option<Float64Array>,
-        voxels: Option<Vec<u32>>,
-        nearest: Option<Float64Array>,
-        start: Option<TriangleCopy>,
-        is_closed: bool,
-        params: &JsValue,
-    ) -> Result<RawTracker, JsValue> {
-        let options = options(volume, corners, voxels, nearest, start, is_closed, params)?;
-        let tracker = SurfaceTracker::new(options).map_err(Failure::from)?;
+    pub fn new(options: RawTrackingOptions) -> Result<RawTracker, JsValue> {
+        let tracker = SurfaceTracker::new(options.0).map_err(Failure::from)?;
         Ok(RawTracker::of(tracker))
     }
 

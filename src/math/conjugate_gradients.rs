@@ -1,6 +1,10 @@
 //! Preconditioned conjugate gradients for sparse and structured linear systems.
 
 use super::vectors::{add, dot};
+use crate::pauses::{Pauses, finished};
+
+/// The number of numbers in a vector that count as one unit of work between pauses.
+const NUMBERS_PER_UNIT: usize = 2048;
 
 /// The state of the conjugate gradient iteration for a linear system A x = b with a symmetric positive definite or
 /// semidefinite matrix A, which is only needed as a function that multiplies by it.
@@ -34,15 +38,32 @@ impl ConjugateGradients {
         precondition: impl FnOnce(&mut [f64]) -> Vec<f64>,
     ) -> bool {
         let image = product(&self.direction);
+        finished(self.iterate_in_slices(image, precondition, &Pauses::default()))
+    }
+
+    /// Does one iteration as [`Self::iterate`] does, given the product of A and [`Self::direction`], and pauses meanwhile.
+    pub async fn iterate_in_slices(
+        &mut self,
+        image: Vec<f64>,
+        precondition: impl FnOnce(&mut [f64]) -> Vec<f64>,
+        pauses: &Pauses,
+    ) -> bool {
+        let work = image.len() / NUMBERS_PER_UNIT;
         let curvature = dot(&self.direction, &image);
         if curvature <= 0.0 || self.energy <= 0.0 {
             return false;
         }
         let step = self.energy / curvature;
+        pauses.after(work).await;
         add(step, &self.direction, &mut self.solution);
+        pauses.after(work).await;
         add(-step, &image, &mut self.residual);
+        drop(image);
+        pauses.after(work).await;
         let preconditioned = precondition(&mut self.residual);
+        pauses.after(work).await;
         let energy = dot(&self.residual, &preconditioned);
+        pauses.after(work).await;
         let ratio = energy / self.energy;
         self.energy = energy;
         self.direction.iter_mut().zip(&preconditioned).for_each(|(d, z)| *d = z + ratio * *d);
@@ -52,6 +73,11 @@ impl ConjugateGradients {
     /// Returns the solution x found so far.
     pub fn solution(&self) -> &[f64] {
         &self.solution
+    }
+
+    /// Returns the direction in which the next iteration goes.
+    pub fn direction(&self) -> &[f64] {
+        &self.direction
     }
 
     /// Returns the solution x found so far, and ends the iteration.

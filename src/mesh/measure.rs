@@ -82,6 +82,14 @@ pub fn measure(mesh: &TriangleMesh) -> Measures {
     }
 }
 
+/// Returns the volume that [`measure`] finds, alone.
+pub(crate) fn enclosed_volume(mesh: &TriangleMesh) -> f64 {
+    let used = used_vertices(mesh.positions.len(), &mesh.triangles);
+    let bounds = bounds(used.iter().map(|&v| mesh.positions[v as usize].as_dvec3()));
+    let corners = mesh.triangles.iter().map(|t| t.map(|v| mesh.positions[v as usize].as_dvec3()));
+    solid(corners, 0.5 * (bounds[0] + bounds[1])).volume
+}
+
 fn used_vertices(count: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
     let mut used = vec![false; count];
     triangles.iter().flatten().for_each(|&v| used[v as usize] = true);

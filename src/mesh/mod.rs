@@ -54,6 +54,7 @@ pub use geodesic::{geodesic_distances, geodesic_distances_from};
 pub use ids::VertexId;
 pub(crate) use ids::sort_distinct;
 pub use journal::TriangleCorners;
+pub(crate) use measure::enclosed_volume;
 pub use measure::{Measures, measure};
 pub use origin::{WorldPositions, grid_origin, world_origin};
 pub use patch::{Patch, PatchCorner};

@@ -5,7 +5,12 @@ use super::edge_table::sorted_half_edges;
 use super::{MeshError, Texture};
 use crate::math::order::sort_triples;
 use crate::math::{DAffine3, DVec3, Groups, Vec2, Vec3, triangle};
+use crate::pauses::Pauses;
 use std::sync::Arc;
+
+/// Number of triangles between two pauses, and of those that count as one unit of work.
+const CHUNK: usize = 1 << 16;
+const TRIANGLES_PER_UNIT: usize = 32;
 
 /// An indexed triangle list with optional normals, texture coordinates and colours. It need not be closed or manifold.
 ///
@@ -116,6 +121,39 @@ impl TriangleMesh {
         let mut slots = vec![u32::MAX; self.positions.len()];
         let members = self.component_triangles();
         members.iter().map(|component| self.triangle_subset(component, &mut slots)).collect()
+    }
+
+    /// Returns what [`Self::components`] does, of a mesh whose components touch at no vertex, with less memory, and pauses
+    /// meanwhile.
+    pub(crate) async fn separate_components(&self, pauses: &Pauses) -> Vec<Self> {
+        let mut groups = DisjointSets::new(self.positions.len());
+        for triangles in self.triangles.chunks(CHUNK) {
+            for [a, b, c] in triangles.iter().map(|corners| corners.map(|v| v as usize)) {
+                groups.union(a, b);
+                groups.union(b, c);
+            }
+            pauses.after(triangles.len() / TRIANGLES_PER_UNIT).await;
+        }
+        let mut numbers = vec![u32::MAX; self.positions.len()];
+        let mut members: Vec<Vec<usize>> = Vec::new();
+        for (i, triangles) in self.triangles.chunks(CHUNK).enumerate() {
+            for (t, corners) in (i * CHUNK..).zip(triangles) {
+                let number = &mut numbers[groups.find(corners[0] as usize)];
+                if *number == u32::MAX {
+                    *number = members.len() as u32;
+                    members.push(Vec::new());
+                }
+                members[*number as usize].push(t);
+            }
+            pauses.after(triangles.len() / TRIANGLES_PER_UNIT).await;
+        }
+        let mut slots = vec![u32::MAX; self.positions.len()];
+        let mut components = Vec::with_capacity(members.len());
+        for triangles in members {
+            components.push(self.triangle_subset(&triangles, &mut slots));
+            pauses.after(1 + triangles.len() / TRIANGLES_PER_UNIT).await;
+        }
+        components
     }
 
     /// Returns the mesh with the connected components of the given indices alone, as numbered by [`Self::components`].
@@ -260,6 +298,16 @@ mod tests {
             m.positions.iter().zip(normals).all(|(p, n)| (*p - centre).dot(*n) > 0.0)
         };
         assert!(outward(&mesh) && outward(&moved));
+    }
+
+    #[test]
+    fn components_that_touch_nowhere_come_apart_alike_by_edges_and_by_vertices() {
+        let values = (0..4096).map(|i| f32::from(u8::from(i * i % 7 < 2))).collect();
+        let grid = crate::volume::Grid::new([16; 3], values).unwrap();
+        let mesh = crate::volume::marching_cubes(&grid, 0.5).unwrap();
+        let found = crate::pauses::finished(mesh.separate_components(&Pauses::default()));
+        assert!(found.len() > 3, "{}", found.len());
+        assert_eq!(found, mesh.components());
     }
 
     #[test]

@@ -30,6 +30,12 @@ pub enum MethodError {
         /// The largest number of vertices accepted for the surface.
         most: usize,
     },
+    /// There is more to work with than memory is given for.
+    #[error("{problem}")]
+    TooLarge {
+        /// What there is too much of, and how to avoid it.
+        problem: String,
+    },
     /// A linear system, that of the implicit surface's constraints, could not be solved to the requested tolerance.
     #[error("the system of {constraints} constraints cannot be solved to the requested tolerance: {cause}")]
     Singular {

@@ -29,7 +29,7 @@ beforeAll(async () => {
   await init();
   film = Volume.parse(new Uint8Array(await readFile(at('www/public/data/heart.nii.gz'))));
   volume = prepare(film, setup.preparation, () => undefined);
-  tracker = buildTracker(volume, setup).tracker;
+  tracker = buildTracker(volume, setup, false).tracker;
   tracker.step(tracker.frames);
   bounded = tracker.save();
 });
@@ -99,7 +99,7 @@ async function stepsIn(prediction: boolean): Promise<number> {
   const setup = setupOf(example);
   const film = await openImage(example.source);
   const image = prepare(film, setup.preparation, () => undefined);
-  const { tracker } = buildTracker(image, { ...setup, params: { ...setup.params, prediction } });
+  const { tracker } = buildTracker(image, { ...setup, params: { ...setup.params, prediction } }, false);
   tracker.step(tracker.frames + 5);
   const later = tracker.statistics.slice(1);
   for (const one of [tracker, image, film]) one.free();

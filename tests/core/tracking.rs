@@ -5,7 +5,7 @@ use vesicle::math::{DAffine3, DVec3, Vec3};
 use vesicle::mesh::{Measures, MeshError, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{
-    Bounds, Cavity, Component, SurfaceTracker, TrackingOptions, TrackingParams,
+    Bounds, Cavity, Component, SurfaceTracker, TrackingLimits, TrackingOptions, TrackingParams,
 };
 use vesicle::spatial::surface_distance;
 use vesicle::volume::{Enrichment, Volume, VolumeInit, Voxels};
@@ -22,6 +22,7 @@ fn options(cine: &Cine, volume: Volume) -> TrackingOptions {
         component: Component::Largest,
         start: None,
         cavity: Cavity::Open,
+        limits: TrackingLimits::default(),
         params: TrackingParams { threshold: THRESHOLD, cyclic: true, ..TrackingParams::default() },
     }
 }
@@ -224,6 +225,7 @@ fn the_box_closes_surfaces_that_continue_beyond_it_also_in_mirrored_volumes() {
                 component: Component::Largest,
                 start: None,
                 cavity: Cavity::Open,
+                limits: TrackingLimits::default(),
                 params,
             });
             // Up to the outer faces of the voxels at the ends.

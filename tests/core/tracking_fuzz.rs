@@ -8,7 +8,7 @@ use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::{count_self_intersections, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{
-    Bounds, Cavity, Component, SurfaceTracker, TrackingOptions, TrackingParams,
+    Bounds, Cavity, Component, SurfaceTracker, TrackingLimits, TrackingOptions, TrackingParams,
 };
 use vesicle::volume::{Volume, VolumeInit, Voxels};
 #[cfg(target_arch = "wasm32")]
@@ -79,7 +79,15 @@ fn random_options(random: &mut Random) -> TrackingOptions {
     };
     let params = random_params(random);
     let cavity = if random.below(2) == 0 { Cavity::Open } else { Cavity::Closed };
-    TrackingOptions { volume, bounds, component, start: None, cavity, params }
+    TrackingOptions {
+        volume,
+        bounds,
+        component,
+        start: None,
+        cavity,
+        limits: TrackingLimits::default(),
+        params,
+    }
 }
 
 /// Tracks a sequence and returns the number of frames, or the error that refuses it.

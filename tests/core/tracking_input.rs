@@ -8,7 +8,7 @@ use vesicle::math::{DAffine3, DVec3, Vec3};
 use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{
-    Bounds, Cavity, Component, SurfaceTracker, TrackingOptions, TrackingParams,
+    Bounds, Cavity, Component, SurfaceTracker, TrackingLimits, TrackingOptions, TrackingParams,
 };
 use vesicle::volume::{Volume, VolumeError, VolumeInit, Voxels};
 use vesicle::warning::{Place, WarningCode};
@@ -73,6 +73,7 @@ fn options(volume: Volume) -> TrackingOptions {
         component: Component::Largest,
         start: None,
         cavity: Cavity::Open,
+        limits: TrackingLimits::default(),
         params,
     }
 }
@@ -472,6 +473,7 @@ impl Scene {
             component: if self.names_point { Component::Nearest(point) } else { Component::Largest },
             start,
             cavity: Cavity::Open,
+            limits: TrackingLimits::default(),
             params,
         })?;
         for mesh in tracker.meshes() {

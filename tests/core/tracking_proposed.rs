@@ -6,7 +6,8 @@ use vesicle::math::{DAffine3, DVec3};
 use vesicle::mesh::{count_self_intersections, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{
-    Bounds, Cavity, Component, Proposal, Query, SurfaceTracker, TrackingOptions, TrackingParams,
+    Bounds, Cavity, Component, Proposal, Query, SurfaceTracker, TrackingLimits, TrackingOptions,
+    TrackingParams,
 };
 use vesicle::pauses::{advance, finished};
 use vesicle::volume::{Enrichment, Volume, VolumeInit, Voxels};
@@ -123,6 +124,7 @@ fn options(volume: Volume, proposal: &Proposal, cavity: Cavity) -> TrackingOptio
         component: Component::Nearest(proposal.component),
         start: None,
         cavity,
+        limits: TrackingLimits::default(),
         params: TrackingParams { threshold: proposal.threshold, cyclic: true, ..TrackingParams::default() },
     }
 }
@@ -399,6 +401,7 @@ fn an_object_that_divides_within_its_surface_is_told() {
             component,
             start: None,
             cavity: Cavity::Open,
+            limits: TrackingLimits::default(),
             params: TrackingParams::default(),
         };
         tracked(options)
@@ -442,6 +445,7 @@ fn a_state_of_another_cavity_is_refused_in_words() {
             component: Component::Largest,
             start: None,
             cavity,
+            limits: TrackingLimits::default(),
             params: TrackingParams::default(),
         })
         .unwrap()

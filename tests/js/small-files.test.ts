@@ -2,7 +2,7 @@
 import { deflateSync, gzipSync } from 'node:zlib';
 import { expect, test } from 'vitest';
 import startReaders, { parseVolume } from '../../pkg/import/index.js';
-import { DeformableModel, LabelSurfaces, Mesh, Volume } from '../../pkg/index.js';
+import { DeformableModel, LabelSurfaces, Mesh, SurfaceTracker, Volume } from '../../pkg/index.js';
 import { readTiff } from '../../pkg/tiff/index.js';
 import { openZarr } from '../../pkg/zarr/index.js';
 import { ball, failure, HEALTHY, rejection } from './helpers.js';
@@ -138,4 +138,67 @@ test('a run ends with an error where the surface would have more vertices than a
   expect(error).toMatchObject({ code: 'too-large' });
   expect(model.mesh.check()).toMatchObject(HEALTHY);
   expect(model.mesh.info().vertices).toBeLessThanOrEqual(most);
+});
+
+/** A sequence of two frames of stripes or of a ball, in a small file. */
+function sequence(size: number, isBright: (at: [number, number, number], frame: number) => boolean): Volume {
+  const voxels = Uint8Array.from({ length: 2 * size ** 3 }, (_, i) => {
+    const at = [i % size, Math.floor(i / size) % size, Math.floor(i / size ** 2) % size] as [number, number, number];
+    return isBright(at, Math.floor(i / size ** 3)) ? 200 : 10;
+  });
+  const header = `NRRD0004\ntype: uint8\ndimension: 4\nsizes: ${size} ${size} ${size} 2\nencoding: gzip\n\n`;
+  return Volume.parse(new Uint8Array(Buffer.concat([Buffer.from(header), gzipSync(voxels)])));
+}
+
+const striped = (size: number) => sequence(size, ([x], frame) => ((x + frame) & 4) > 0);
+const beating = (size: number) =>
+  sequence(size, (at, frame) => Math.hypot(...at.map((x) => x - size / 2)) < size / 4 + frame);
+
+test('tracking in a box of too many voxels is refused before it begins, unless more are allowed', async () => {
+  const volume = striped(216);
+  const tracker = new SurfaceTracker({ volume });
+  expect(await rejection(tracker.run())).toMatchObject({
+    code: 'too-large',
+    message: expect.stringContaining('220 × 220 × 220 voxels'),
+  });
+  expect(tracker.boundary(0)).toHaveLength(0);
+  const part = new SurfaceTracker({ volume, voxels: { min: [0, 0, 0], max: [31, 31, 31] } });
+  expect(part.step().phase).toContain('boundary');
+});
+
+test('a lattice is refused as soon as its boundary is found, unless more vertices are allowed', async () => {
+  const volume = striped(32);
+  const few = new SurfaceTracker({ volume, maxVertices: 500 });
+  expect(await rejection(few.run())).toMatchObject({
+    code: 'too-large',
+    message: expect.stringContaining('use a smaller box'),
+  });
+  expect(few.boundary(0)).toHaveLength(0);
+  const blocks = sequence(32, (at, frame) => at.reduce((sum, x) => sum + (x >> 1), frame) % 2 > 0);
+  const points = new SurfaceTracker({ volume: blocks, maxVoxels: 36 ** 3 });
+  expect(await rejection(points.run())).toMatchObject({ code: 'too-large' });
+  expect((await new SurfaceTracker({ volume }).run()).done).toBe(true);
+});
+
+test('a ball of a small file is tracked, with the bits that it has in other images', async () => {
+  const volume = beating(40);
+  const small = new SurfaceTracker({ volume });
+  await small.run();
+  const other = new SurfaceTracker({ volume, maxVertices: 4_000_000, maxVoxels: 1e8 });
+  await other.run();
+  expect(small.volumes()[1]).toBeGreaterThan(4000);
+  expect(Buffer.from(small.save()).equals(Buffer.from(other.save()))).toBe(true);
+});
+
+test('a tracked surface with more vertices than allowed ends the run, and nothing is lost', async () => {
+  const volume = beating(40);
+  const full = new SurfaceTracker({ volume });
+  await full.run();
+  const most = full.mesh.info().vertices - 1;
+  const tracker = new SurfaceTracker({ volume, maxVertices: most });
+  expect(await rejection(tracker.run())).toMatchObject({
+    code: 'too-large',
+    message: expect.stringContaining(`more than ${most} vertices`),
+  });
+  expect(tracker.statistics.length).toBeLessThan(2);
 });

@@ -4,6 +4,9 @@ import type { NamedBytes } from './protocol';
 /** Bytes of files that are small, all together. */
 export const SMALL = 2 ** 17;
 
+/** What a tracker of an image in small files may work with; with more, the page takes over a gigabyte. */
+export const TRACK_OF_SMALL = { maxVertices: 200_000, maxVoxels: 8_000_000 };
+
 /** Returns whether files are small, all together. */
 export function areSmall(files: readonly (Blob | NamedBytes)[]): boolean {
   return files.reduce((sum, file) => sum + (file instanceof Blob ? file.size : file.bytes.length), 0) <= SMALL;

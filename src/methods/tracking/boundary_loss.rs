@@ -8,7 +8,8 @@ use super::project::Onto;
 use crate::math::Vec3;
 use crate::math::order::{combined_rank, rank_f32, sort_by_rank};
 use crate::mesh::{Mesh, VertexId};
-use crate::remesh::{Changes, restructure};
+use crate::pauses::Pauses;
+use crate::remesh::{Changes, restructure_in_slices};
 use crate::spatial::PointGrid;
 use std::collections::BTreeSet;
 
@@ -53,6 +54,7 @@ impl FrameTracker {
         let mut before = usize::MAX;
         for round in 0..ROUNDS {
             let without_boundary = without_boundary(mesh, context);
+            context.pauses.after(mesh.slots()).await;
             if round == 0 {
                 statistics.without_boundary = without_boundary.len();
             }
@@ -61,13 +63,15 @@ impl FrameTracker {
                 break;
             }
             before = without_boundary.len();
-            let collapsed = self.collapse_sheets(mesh, &on_sheets(mesh, &without_boundary, context));
+            let sheets = on_sheets(mesh, &without_boundary, context);
+            context.pauses.after(without_boundary.len()).await;
+            let collapsed = self.collapse_sheets(mesh, &sheets, context.pauses).await;
             if collapsed > 0 {
                 changes.deletions += collapsed;
-                changes += restructure(mesh, self.bounds, &mut self.guard);
+                changes += restructure_in_slices(mesh, self.bounds, &mut self.guard, context.pauses).await;
             }
             for _ in 0..MOVES {
-                grown.extend(self.move_without_boundary(mesh, context));
+                grown.extend(self.move_without_boundary(mesh, context).await);
                 context.pauses.after(mesh.slots()).await;
             }
         }
@@ -83,9 +87,11 @@ impl FrameTracker {
     /// Moves the vertices at which the image shows no boundary: outwards if the image is bright on both sides of them
     /// and they are on no sheet between walls that have met, else to the mean of their neighbours. Returns the vertices
     /// chosen to move outwards.
-    fn move_without_boundary(&mut self, mesh: &mut Mesh, context: &FrameContext) -> Vec<VertexId> {
+    async fn move_without_boundary(&mut self, mesh: &mut Mesh, context: &FrameContext<'_>) -> Vec<VertexId> {
         let without_boundary = without_boundary(mesh, context);
+        context.pauses.after(mesh.slots()).await;
         let sheets = on_sheets(mesh, &without_boundary, context);
+        context.pauses.after(without_boundary.len()).await;
         let voxel = context.region.spacing.min_element() as f32;
         let mut displacements = vec![Vec3::ZERO; mesh.slots()];
         let mut grown = Vec::new();
@@ -98,13 +104,13 @@ impl FrameTracker {
                 grown.push(v);
             }
         }
-        self.move_vertices(mesh, displacements);
+        self.move_vertices(mesh, displacements, context.pauses).await;
         grown
     }
 
     /// Collapses the vertices `sheets`, which are on sheets between walls that have met, into their neighbours, from
     /// the innermost vertices to the rim; returns the number of collapses.
-    fn collapse_sheets(&mut self, mesh: &mut Mesh, sheets: &[VertexId]) -> u32 {
+    async fn collapse_sheets(&mut self, mesh: &mut Mesh, sheets: &[VertexId], pauses: &Pauses) -> u32 {
         self.guard.sync_with_edge(mesh, self.bounds.max);
         let depth = depths(mesh, sheets);
         let mut order = sheets.to_vec();
@@ -120,6 +126,7 @@ impl FrameTracker {
                 self.guard.attempt(mesh, |mesh| mesh.collapse(w, v, position)).is_ok()
             });
             collapsed += u32::from(drawn);
+            pauses.after(1).await;
         }
         collapsed
     }

@@ -2,7 +2,7 @@
 //! from one chamber into the next without a step in intensity, so the box ends the region: its sides get faces of full
 //! weight there, and the surface is closed.
 
-use super::labelling::{VoxelBox, label_bright, label_bright_by_level};
+use super::labelling::{FACES_PER_UNIT, VoxelBox, label_bright, label_bright_by_level};
 use super::region::Region;
 use super::vote::{Face, Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
@@ -70,19 +70,34 @@ impl Region {
     /// frame is bright, so that the surface is closed there.
     pub async fn clip_to_box(&self, frame: usize, faces: &mut Faces, pauses: &Pauses) {
         for (direction, list) in faces.iter_mut().enumerate() {
-            list.retain(|face| {
-                self.voxels_at_face(direction, face.voxel).iter().all(|&at| self.is_inside(at))
-            });
+            let mut kept = 0;
+            for i in 0..list.len() {
+                if self.voxels_at_face(direction, list[i].voxel).iter().all(|&at| self.is_inside(at)) {
+                    list[kept] = list[i];
+                    kept += 1;
+                }
+                if i % FACES_PER_UNIT == 0 {
+                    pauses.after(1).await;
+                }
+            }
+            list.truncate(kept);
         }
         let mut added: [Vec<Face>; 3] = Default::default();
+        let mut by_level = None;
         for (direction, list) in added.iter_mut().enumerate() {
             let [first, last] = self.inner.map(|at| at[direction]);
             // A face is indexed by the voxel before it.
             if let Some(before) = first.checked_sub(1) {
-                list.extend(self.box_side_faces(frame, faces, direction, [first, before], pauses).await);
+                let layers = [first, before];
+                list.extend(
+                    self.box_side_faces(frame, faces, direction, layers, &mut by_level, pauses).await,
+                );
             }
             if last + 1 < self.dims[direction] {
-                list.extend(self.box_side_faces(frame, faces, direction, [last; 2], pauses).await);
+                let layers = [last; 2];
+                list.extend(
+                    self.box_side_faces(frame, faces, direction, layers, &mut by_level, pauses).await,
+                );
             }
         }
         faces.iter_mut().zip(added).for_each(|(list, added)| list.extend(added));
@@ -90,24 +105,27 @@ impl Region {
 
     /// Returns faces of weight 1 in a side of the box where the adjacent `layer` of voxels is bright; `at` is the layer
     /// of the voxels before the faces. Both are indices along `direction`. If no boundary crosses the side, the nearest wall
-    /// in the box decides.
+    /// in the box decides: `by_level` are the bright voxels of the box by that, for all sides, once they are known.
     async fn box_side_faces(
         &self,
         frame: usize,
         faces: &Faces,
         direction: usize,
         [layer, at]: [usize; 2],
+        by_level: &mut Option<Option<Vec<bool>>>,
         pauses: &Pauses,
     ) -> Vec<Face> {
         let mut side = VoxelBox { ends: self.inner };
         side.ends.iter_mut().for_each(|end| end[direction] = layer);
         let inner = VoxelBox { ends: self.inner };
         let own = label_bright(self, frame, faces, side, pauses).await;
-        let fallback = if own.is_none() { label_bright_by_level(self, frame, faces, inner) } else { None };
-        let is_bright = |i: &usize| match (&own, &fallback) {
+        if own.is_none() && by_level.is_none() {
+            *by_level = Some(label_bright_by_level(self, frame, faces, inner, pauses).await);
+        }
+        let is_bright = |i: &usize| match (&own, &*by_level) {
             (Some(own), _) => own[*i],
-            (None, Some(fallback)) => inner.index(side.at(*i)).is_some_and(|i| fallback[i]),
-            (None, None) => false,
+            (None, Some(Some(fallback))) => inner.index(side.at(*i)).is_some_and(|i| fallback[i]),
+            (None, _) => false,
         };
         let [nx, ny, _] = self.dims;
         let bright = (0..side.len()).filter(is_bright);
@@ -121,12 +139,15 @@ impl Region {
 
     /// Returns the indices, sorted, of the voxels of the box that are adjacent to faces in its sides: there, the image
     /// is bright up to the side, which is a boundary of the surface.
-    pub fn bright_box_side_voxels(&self, faces: &Faces) -> Vec<u32> {
+    pub async fn bright_box_side_voxels(&self, faces: &Faces, pauses: &Pauses) -> Vec<u32> {
         let [nx, ny, _] = self.dims;
         let mut voxels = Vec::new();
         for direction in [X, Y, Z] {
             let step = [1, nx, nx * ny][direction] as u32;
-            for face in &faces[direction] {
+            for (i, face) in faces[direction].iter().enumerate() {
+                if i % FACES_PER_UNIT == 0 {
+                    pauses.after(1).await;
+                }
                 match self.outward_at_box_side(direction, face.voxel) {
                     Some(outward) if outward[direction] > 0.0 => voxels.push(face.voxel),
                     Some(_) => voxels.push(face.voxel + step),

@@ -5,7 +5,7 @@
 //! cannot reach, the dark voxels are filled with the intensity of the blood around them, before the votes. A convex cavity
 //! has none, whatever the radius of the ball.
 
-use super::labelling::{VoxelBox, extend_to_all};
+use super::labelling::{UNKNOWN, VoxelBox, extend_to_all};
 use super::lattice::Lattice;
 use super::organ::{Organ, depths, order};
 use super::presence::inside_voxels;
@@ -158,9 +158,11 @@ impl SurfaceTracker {
         }
         voting.ensure_levels(region, frame, pauses).await;
         let voxels = VoxelBox { ends: region.inner };
-        let known = (0..voxels.len()).map(|i| voting.level_at(region, frame, voxels.at(i)).map(f64::from));
-        let Some(levels) = extend_to_all(known.collect(), voxels.dims()) else { return bright };
-        pauses.after(levels.len() / 64).await;
+        let known = |i: usize| voting.level_at(region, frame, voxels.at(i)).map_or(UNKNOWN, f64::from);
+        let known = (0..voxels.len()).map(known).collect();
+        pauses.now().await;
+        let Some(levels) = extend_to_all(known, voxels.dims(), pauses).await else { return bright };
+        pauses.now().await;
         let lattice = region.lattice();
         // Where noise is weak, smoothing would only make narrow parts darker.
         let is_noisy = self.image.noise * MANY_NOISES > self.params.threshold;
@@ -170,6 +172,7 @@ impl SurfaceTracker {
             let voxel = region.index(voxels.at(i));
             bright[voxel] = f64::from(blurred[voxel]) > level;
         }
+        pauses.now().await;
         bright
     }
 }

@@ -5,12 +5,12 @@ use super::extremal::plane;
 use super::labelling::{MIN_WEIGHT, VoxelBox, label_bright};
 use super::region::Region;
 use super::samples::{Falloff, SampleField};
-use super::vote::{Faces, X, Y, Z};
+use super::vote::{Faces, X, Y, Z, too_much_boundary};
 use crate::math::{DAffine3, DVec3};
 use crate::mesh::TriangleMesh;
 use crate::methods::MethodError;
 use crate::pauses::Pauses;
-use crate::volume::{Grid, marching_cubes};
+use crate::volume::{Grid, VolumeError, marching_cubes_in_slices};
 
 /// Half-width of the band around the boundary points in which the distance from the planes fitted to them is used, as a
 /// share of the radius of the plane fits; elsewhere only the inside/outside labelling counts.
@@ -18,6 +18,10 @@ const BAND: f64 = 0.8;
 
 /// Number of voxels to either side of a voxel over which the intensity gradient is estimated, to orient normals.
 const SLOPE_RADIUS: usize = 2;
+
+/// Number of voxels between two pauses, and of those that count as one unit of work.
+const VOXELS_PER_CHUNK: usize = 1 << 16;
+const VOXELS_PER_UNIT: usize = 64;
 
 /// A boundary point with its unit normal, which points from bright to dark.
 struct Oriented {
@@ -28,11 +32,16 @@ struct Oriented {
 
 /// Extracts the closed surfaces around all bright regions of a frame, in the working space; an empty mesh if
 /// the image has no boundary.
+///
+/// # Errors
+/// [`MethodError::TooLarge`] if they have more than about `most` triangles, [`MethodError::Volume`] if memory does not
+/// suffice.
 pub(super) async fn extract_bright_surface(
     region: &Region,
     frame: usize,
     faces: &Faces,
     falloff: Falloff,
+    most: usize,
     pauses: &Pauses,
 ) -> Result<TriangleMesh, MethodError> {
     let part = VoxelBox { ends: region.inner };
@@ -42,17 +51,33 @@ pub(super) async fn extract_bright_surface(
     let points = oriented(region, frame, faces, falloff, pauses).await;
     let band = BAND * falloff.radius;
     let distance = signed_distances(region, &points, band, pauses).await;
+    drop(points);
     let value = |i: usize| {
         let at = region.voxel(i as u32);
         let side = if part.index(at).is_some_and(|i| is_bright[i]) { band } else { -band };
         // Beyond the box everything is outside.
-        let most = -region.distance_outside_box(at);
-        distance[i].unwrap_or(side).clamp(-band, band).min(most) as f32
+        let inside = -region.distance_outside_box(at);
+        let distance = if distance[i].is_nan() { side } else { distance[i] };
+        distance.clamp(-band, band).min(inside) as f32
     };
-    let values = (0..distance.len()).map(value).collect();
-    let mesh = marching_cubes(&Grid::new(region.dims, values)?, 0.0)?;
+    let mut values = Vec::with_capacity(distance.len());
+    while values.len() < distance.len() {
+        let first = values.len();
+        let end = distance.len().min(first + VOXELS_PER_CHUNK);
+        values.extend((first..end).map(value));
+        pauses.after((end - first) / VOXELS_PER_UNIT).await;
+    }
+    drop(distance);
+    let grid = Grid::new(region.dims, values)?;
+    let mesh = marching_cubes_in_slices(&grid, 0.0, most, pauses).await.map_err(|error| match error {
+        VolumeError::TooManyTriangles { .. } => too_much_boundary(),
+        other => other.into(),
+    })?;
+    drop(grid);
     let map = region.to_space * DAffine3::from_scale(region.spacing);
-    Ok(mesh.transformed(&map).relative_to(DVec3::ZERO))
+    let mesh = mesh.transformed(&map);
+    pauses.after(mesh.positions.len() / VOXELS_PER_UNIT).await;
+    Ok(mesh.relative_to(DVec3::ZERO))
 }
 
 /// Returns the centres of the faces that separate bright from dark in a frame, those with a weight of at least
@@ -65,7 +90,7 @@ async fn oriented(
     falloff: Falloff,
     pauses: &Pauses,
 ) -> Vec<Oriented> {
-    let field = SampleField::single_frame(region, falloff, faces);
+    let field = SampleField::single_frame(region, falloff, faces, pauses).await;
     let mut points = Vec::new();
     for direction in [X, Y, Z] {
         for face in faces[direction].iter().filter(|face| face.weight >= MIN_WEIGHT) {
@@ -105,14 +130,9 @@ fn rising_direction(region: &Region, frame: usize, voxel: [usize; 3]) -> DVec3 {
 }
 
 /// Returns for each voxel within `band` of boundary points the weighted mean of its signed distances to the planes
-/// through these points, positive inside; `None` for other voxels. The surface of the frame is
+/// through these points, positive inside; NaN for other voxels. The surface of the frame is
 /// the zero level of these distances.
-async fn signed_distances(
-    region: &Region,
-    points: &[Oriented],
-    band: f64,
-    pauses: &Pauses,
-) -> Vec<Option<f64>> {
+async fn signed_distances(region: &Region, points: &[Oriented], band: f64, pauses: &Pauses) -> Vec<f64> {
     let [nx, ny, nz] = region.dims;
     let mut sums = vec![(0.0f64, 0.0f64); nx * ny * nz];
     for point in points {
@@ -137,5 +157,6 @@ async fn signed_distances(
         }
         pauses.after(1).await;
     }
-    sums.into_iter().map(|(sum, total)| (total > 0.0).then(|| sum / total)).collect()
+    pauses.now().await;
+    sums.into_iter().map(|(sum, total)| if total > 0.0 { sum / total } else { f64::NAN }).collect()
 }

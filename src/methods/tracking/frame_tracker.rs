@@ -8,7 +8,7 @@ use super::vote::BoundaryVoting;
 use crate::math::Vec3;
 use crate::mesh::{Mesh, VertexId, curvature, measure};
 use crate::pauses::Pauses;
-use crate::remesh::{Changes, EdgeBounds, Embedding, restructure};
+use crate::remesh::{Changes, EdgeBounds, Embedding, restructure_in_slices};
 use serde::{Deserialize, Serialize};
 
 /// Number of times that predicted displacements and curvature corrections of the vertices are averaged over neighbours:
@@ -147,9 +147,10 @@ impl FrameTracker {
             changes += self.project_and_restructure(mesh, predicted, context, &mut statistics).await;
             predicted = vec![Vec3::ZERO; mesh.slots()];
         }
-        self.correct_curvature_bias(mesh, context, &mut statistics);
+        self.correct_curvature_bias(mesh, context, &mut statistics).await;
         context.pauses.after(mesh.slots()).await;
-        statistics.folded = self.unfold(mesh);
+        statistics.folded = self.unfold(mesh, context.pauses).await;
+        context.pauses.after(mesh.slots()).await;
         let measured = measure(&mesh.to_triangles());
         (statistics.volume, statistics.area, statistics.triangles) =
             (measured.volume, measured.area, measured.triangles);
@@ -168,7 +169,7 @@ impl FrameTracker {
     ) -> Changes {
         let mut changes = Changes::default();
         self.project_all(mesh, &offsets, context, Onto::SpaceTime, statistics).await;
-        changes += restructure(mesh, self.bounds, &mut self.guard);
+        changes += restructure_in_slices(mesh, self.bounds, &mut self.guard, context.pauses).await;
         context.pauses.after(mesh.slots()).await;
         self.project_all(mesh, &tangential_displacements(mesh), context, Onto::Frame, statistics).await;
         changes += self.resolve_boundary_loss(mesh, context, statistics).await;
@@ -180,15 +181,16 @@ impl FrameTracker {
     /// mean curvature; and that of the triangles between vertices on the surface, which lie on its inner side by e²/8 times
     /// the mean curvature on average, with their edge length e. Vertices move along their normals by as much, outwards
     /// where the surface is convex, but at most by [`MAX_CURVATURE_CORRECTION`].
-    fn correct_curvature_bias(
+    async fn correct_curvature_bias(
         &mut self,
         mesh: &mut Mesh,
-        context: &FrameContext,
+        context: &FrameContext<'_>,
         statistics: &mut FrameStatistics,
     ) {
         let spread = ((context.params.radius * context.params.radius + self.edge * self.edge) / 8.0) as f32;
         let limit = (MAX_CURVATURE_CORRECTION * context.region.spacing.min_element()) as f32;
         let bends = curvature(&mesh.to_triangles()).mean;
+        context.pauses.after(mesh.slots()).await;
         let mut displacements = vec![Vec3::ZERO; mesh.slots()];
         for (v, bend) in mesh.vertices().zip(bends) {
             displacements[v.index()] = mesh.unit_normal(v) * (spread * bend as f32);
@@ -198,12 +200,13 @@ impl FrameTracker {
         displacements
             .iter_mut()
             .for_each(|displacement| *displacement = displacement.clamp_length_max(limit));
-        statistics.held_moves += self.move_vertices(mesh, displacements);
+        context.pauses.after(mesh.slots()).await;
+        statistics.held_moves += self.move_vertices(mesh, displacements, context.pauses).await;
     }
 
     /// Moves the vertices of folded triangles, which face away from those around them, to the mean of their neighbours.
     /// Returns the number of triangles that stay folded.
-    fn unfold(&mut self, mesh: &mut Mesh) -> usize {
+    async fn unfold(&mut self, mesh: &mut Mesh, pauses: &Pauses) -> usize {
         let mut folds = folded(mesh);
         for _ in 0..UNFOLDINGS {
             if folds.is_empty() {
@@ -213,7 +216,7 @@ impl FrameTracker {
             for v in folds.into_iter().flatten() {
                 displacements[v.index()] = mesh.ring(v).mean(mesh.positions()) - mesh.position(v);
             }
-            self.move_vertices(mesh, displacements);
+            self.move_vertices(mesh, displacements, pauses).await;
             folds = folded(mesh);
         }
         folds.len()
@@ -267,16 +270,23 @@ impl FrameTracker {
         }
         statistics.rejected += rejected.len();
         let filled_displacements = fill_rejected(mesh, &displacements, &rejected);
-        statistics.held_moves += self.move_vertices(mesh, filled_displacements);
+        statistics.held_moves += self.move_vertices(mesh, filled_displacements, context.pauses).await;
         context.pauses.after(mesh.slots()).await;
         (steps, sum)
     }
 
     /// Moves the vertices by `displacements` (by vertex slot), shortened where the surface would intersect itself.
     /// Returns the number of vertices whose displacements were shortened.
-    pub(super) fn move_vertices(&mut self, mesh: &mut Mesh, mut displacements: Vec<Vec3>) -> usize {
+    pub(super) async fn move_vertices(
+        &mut self,
+        mesh: &mut Mesh,
+        mut displacements: Vec<Vec3>,
+        pauses: &Pauses,
+    ) -> usize {
         self.guard.sync_with_edge(mesh, self.bounds.max);
-        self.guard.move_all(mesh, &mut displacements).len()
+        pauses.after(mesh.slots()).await;
+        let all: Vec<VertexId> = mesh.vertices().collect();
+        self.guard.move_some_in_slices(mesh, &all, &mut displacements, pauses).await.len()
     }
 }
 

@@ -15,6 +15,16 @@ use crate::pauses::Pauses;
 /// Number of voxels that count as one unit of work between pauses, in an iteration of the conjugate gradients.
 const VOXELS_PER_UNIT: usize = 64;
 
+/// Number of faces that count as one unit of work between pauses.
+pub(super) const FACES_PER_UNIT: usize = 256;
+
+/// Numbers of faces and of voxels between two pauses.
+const FACES_PER_CHUNK: usize = 1 << 16;
+const VOXELS_PER_CHUNK: usize = 1 << 18;
+
+/// Stands for a value that is not known; all that are known are numbers.
+pub(super) const UNKNOWN: f64 = f64::NAN;
+
 /// Smallest weight of a face between two voxels, the share of windows that vote for it, with which the face counts as
 /// part of a wall between bright and dark.
 pub(super) const MIN_WEIGHT: f32 = 0.3;
@@ -69,67 +79,92 @@ pub(super) async fn label_bright(
     pauses: &Pauses,
 ) -> Option<Vec<bool>> {
     let dims = voxels.dims();
-    let steps = face_steps(region, frame, faces, voxels);
+    let steps = face_steps(region, frame, faces, voxels, pauses).await;
     let mut source = vec![0.0; dims.iter().product()];
-    for &(i, j, step) in &steps {
-        source[i] -= f64::from(step);
-        source[j] += f64::from(step);
+    for steps in steps.chunks(FACES_PER_CHUNK) {
+        for &(i, j, step) in steps {
+            source[i] -= f64::from(step);
+            source[j] += f64::from(step);
+        }
+        pauses.after(steps.len() / FACES_PER_UNIT).await;
     }
     let reconstructed = solve_poisson(dims, source, pauses).await;
     // Weighted means of the middles of the steps, at voxels adjacent to walls.
     let mut middles = vec![(0.0, 0.0); reconstructed.len()];
-    for &(i, j, step) in steps.iter().filter(|(.., step)| step.abs() >= MIN_WEIGHT) {
-        let (weight, middle) = (f64::from(step.abs()), (reconstructed[i] + reconstructed[j]) / 2.0);
-        for k in [i, j] {
-            middles[k].0 += weight * middle;
-            middles[k].1 += weight;
+    for steps in steps.chunks(FACES_PER_CHUNK) {
+        for &(i, j, step) in steps.iter().filter(|(.., step)| step.abs() >= MIN_WEIGHT) {
+            let (weight, middle) = (f64::from(step.abs()), (reconstructed[i] + reconstructed[j]) / 2.0);
+            for k in [i, j] {
+                middles[k].0 += weight * middle;
+                middles[k].1 += weight;
+            }
         }
+        pauses.after(steps.len() / FACES_PER_UNIT).await;
     }
-    let known = middles.into_iter().map(|(sum, total)| (total > 0.0).then(|| sum / total)).collect();
-    let levels = extend_to_all(known, dims)?;
+    drop(steps);
+    let known =
+        middles.into_iter().map(|(sum, total)| if total > 0.0 { sum / total } else { UNKNOWN }).collect();
+    pauses.after(reconstructed.len() / VOXELS_PER_UNIT).await;
+    let levels = extend_to_all(known, dims, pauses).await?;
     Some(reconstructed.iter().zip(levels).map(|(value, level)| *value > level).collect())
 }
 
 /// Labels the voxels of a box as [`label_bright`] does, but by comparing each intensity with the middle of the
 /// intensity step at the nearest boundary. Solves no equations, but is only right where the signal is as strong as at
 /// that boundary.
-pub(super) fn label_bright_by_level(
+pub(super) async fn label_bright_by_level(
     region: &Region,
     frame: usize,
     faces: &Faces,
     voxels: VoxelBox,
+    pauses: &Pauses,
 ) -> Option<Vec<bool>> {
     let [nx, ny, _] = region.dims;
     let level = |i: usize| {
         let [x, y, z] = voxels.at(i);
         f64::from(region.frames[frame][(z * ny + y) * nx + x])
     };
-    let mut known = vec![None; voxels.len()];
-    for (i, j, _) in
-        face_steps(region, frame, faces, voxels).into_iter().filter(|step| step.2.abs() >= MIN_WEIGHT)
-    {
+    let mut known = vec![UNKNOWN; voxels.len()];
+    let steps = face_steps(region, frame, faces, voxels, pauses).await;
+    for (i, j, _) in steps.into_iter().filter(|step| step.2.abs() >= MIN_WEIGHT) {
         let middle = (level(i) + level(j)) / 2.0;
-        (known[i], known[j]) = (Some(middle), Some(middle));
+        (known[i], known[j]) = (middle, middle);
     }
-    let levels = extend_to_all(known, voxels.dims())?;
-    Some(levels.into_iter().enumerate().map(|(i, middle)| level(i) > middle).collect())
+    pauses.after(voxels.len() / VOXELS_PER_UNIT).await;
+    let levels = extend_to_all(known, voxels.dims(), pauses).await?;
+    let mut bright = Vec::with_capacity(levels.len());
+    for levels in levels.chunks(VOXELS_PER_CHUNK) {
+        let first = bright.len();
+        bright.extend(levels.iter().zip(first..).map(|(middle, i)| level(i) > *middle));
+        pauses.after(levels.len() / VOXELS_PER_UNIT).await;
+    }
+    Some(bright)
 }
 
 /// Returns the steps in intensity at the faces within a box of voxels, of which an image is reconstructed: the indices
 /// in the box of the voxels before and after the face, and its share of votes as the height of the step, negative if
 /// intensity falls.
-fn face_steps(region: &Region, frame: usize, faces: &Faces, voxels: VoxelBox) -> Vec<(usize, usize, f32)> {
+async fn face_steps(
+    region: &Region,
+    frame: usize,
+    faces: &Faces,
+    voxels: VoxelBox,
+    pauses: &Pauses,
+) -> Vec<(usize, usize, f32)> {
     let image = &region.frames[frame];
     let mut steps = Vec::new();
     for direction in [X, Y, Z] {
         let stride = [1, region.dims[0], region.dims[0] * region.dims[1]][direction];
-        for face in &faces[direction] {
-            let before = region.voxel(face.voxel);
-            let mut after = before;
-            after[direction] += 1;
-            let (Some(i), Some(j)) = (voxels.index(before), voxels.index(after)) else { continue };
-            let is_up = image[face.voxel as usize] < image[face.voxel as usize + stride];
-            steps.push((i, j, if is_up { face.weight } else { -face.weight }));
+        for faces in faces[direction].chunks(FACES_PER_CHUNK) {
+            for face in faces {
+                let before = region.voxel(face.voxel);
+                let mut after = before;
+                after[direction] += 1;
+                let (Some(i), Some(j)) = (voxels.index(before), voxels.index(after)) else { continue };
+                let is_up = image[face.voxel as usize] < image[face.voxel as usize + stride];
+                steps.push((i, j, if is_up { face.weight } else { -face.weight }));
+            }
+            pauses.after(faces.len() / FACES_PER_UNIT).await;
         }
     }
     steps
@@ -143,24 +178,27 @@ async fn solve_poisson(dims: [usize; 3], source: Vec<f64>, pauses: &Pauses) -> V
     let mut gradients = ConjugateGradients::new(vec![0.0; source.len()], source, same);
     let enough = TOLERANCE * TOLERANCE * gradients.energy();
     for _ in 0..ITERATIONS {
-        if gradients.energy() <= enough || !gradients.iterate(|x| laplacian(dims, x), same) {
+        if gradients.energy() <= enough {
             break;
         }
-        pauses.after(dims.iter().product::<usize>() / VOXELS_PER_UNIT + 1).await;
+        let image = laplacian(dims, gradients.direction(), pauses).await;
+        if !gradients.iterate_in_slices(image, same, pauses).await {
+            break;
+        }
     }
     gradients.into_solution()
 }
 
 /// Returns for each voxel of a box the sum of its differences from its neighbours, its own entry in `values` minus
 /// theirs: the graph Laplacian.
-fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64]) -> Vec<f64> {
+async fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64], pauses: &Pauses) -> Vec<f64> {
     let mut out = vec![0.0; values.len()];
-    let mut add = |i: usize, j: usize| {
-        let difference = values[i] - values[j];
-        out[i] += difference;
-        out[j] -= difference;
-    };
     for z in 0..nz {
+        let mut add = |i: usize, j: usize| {
+            let difference = values[i] - values[j];
+            out[i] += difference;
+            out[j] -= difference;
+        };
         for y in 0..ny {
             let row = (z * ny + y) * nx;
             (row + 1..row + nx).for_each(|i| add(i, i - 1));
@@ -171,18 +209,29 @@ fn laplacian([nx, ny, nz]: [usize; 3], values: &[f64]) -> Vec<f64> {
                 (row..row + nx).for_each(|i| add(i, i - nx * ny));
             }
         }
+        pauses.after(nx * ny / VOXELS_PER_UNIT + 1).await;
     }
     out
 }
 
 /// Extends values that are known at some voxels of a box to all: each voxel takes the value of the known voxel fewest
-/// steps along the axes away. `None` if no value is known.
-pub(super) fn extend_to_all(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -> Option<Vec<f64>> {
+/// steps along the axes away. Values are [`UNKNOWN`] at others. `None` if no value is known.
+pub(super) async fn extend_to_all(
+    known: Vec<f64>,
+    [nx, ny, nz]: [usize; 3],
+    pauses: &Pauses,
+) -> Option<Vec<f64>> {
     let mut all = known;
-    let mut front: Vec<usize> = (0..all.len()).filter(|&i| all[i].is_some()).collect();
+    let mut front: Vec<u32> = (0..all.len()).filter(|&i| !all[i].is_nan()).map(|i| i as u32).collect();
+    if front.is_empty() {
+        return None;
+    }
     while !front.is_empty() {
         let mut next = Vec::new();
-        for i in front {
+        for (count, i) in front.into_iter().map(|i| i as usize).enumerate() {
+            if count % FACES_PER_UNIT == 0 {
+                pauses.after(1).await;
+            }
             let [x, y, z] = [i % nx, i / nx % ny, i / (nx * ny)];
             let neighbours = [
                 (x > 0).then(|| i - 1),
@@ -193,15 +242,15 @@ pub(super) fn extend_to_all(known: Vec<Option<f64>>, [nx, ny, nz]: [usize; 3]) -
                 (z + 1 < nz).then_some(i + nx * ny),
             ];
             for j in neighbours.into_iter().flatten() {
-                if all[j].is_none() {
+                if all[j].is_nan() {
                     all[j] = all[i];
-                    next.push(j);
+                    next.push(j as u32);
                 }
             }
         }
         front = next;
     }
-    all.into_iter().collect()
+    Some(all)
 }
 
 #[cfg(test)]
@@ -248,7 +297,7 @@ mod tests {
 
     fn faces(region: &Region, threshold: f64) -> Faces {
         let window = Window { half_width: 2, frames: 0, threshold, cyclic: false };
-        finished(BoundaryVoting::new(window, 1).faces(region, 0, &Pauses::default()))
+        finished(BoundaryVoting::new(window, 1).faces(region, 0, usize::MAX, &Pauses::default())).unwrap()
     }
 
     #[test]
@@ -280,6 +329,17 @@ mod tests {
             let depth = near_wall(sheet.at(i));
             assert!(depth.abs() < 1.5 || is_bright == (depth > 0.0), "{:?}", sheet.at(i));
         }
+    }
+
+    #[test]
+    fn values_are_extended_to_many_voxels_with_pauses() {
+        let mut known = vec![UNKNOWN; 1 << 20];
+        known[77] = 3.0;
+        let pauses = Pauses::default();
+        let all = finished(extend_to_all(known, [128, 128, 64], &pauses));
+        assert!(all.unwrap().iter().all(|&value| value == 3.0));
+        assert!(pauses.work() > 1 << 12, "{}", pauses.work());
+        assert!(finished(extend_to_all(vec![UNKNOWN; 8], [2; 3], &pauses)).is_none());
     }
 
     #[test]

@@ -46,19 +46,20 @@ use super::method::method;
 
 use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::{DVec3, Vec3};
-use crate::mesh::{Mesh, TriangleMesh, measure};
+use crate::mesh::{MAX_VERTICES, Mesh, TriangleMesh, measure};
 use crate::pauses::{Pauses, finished};
 use crate::remesh::Changes;
 use crate::spatial::surface_distance;
 use crate::volume::Volume;
 use cavity::Filled;
 use frame_tracker::FrameTracker;
+use labelling::MIN_WEIGHT;
 use presence::Tracked;
 use project::SpaceTimeSamples;
-use region::Region;
+use region::{Region, too_many_voxels};
 use samples::{Falloff, SampleField};
 use std::sync::Arc;
-use vote::{BoundaryVoting, Faces, Window};
+use vote::{BoundaryVoting, Faces, TIME, Window, too_much_boundary};
 use warnings::SurfaceFacts;
 
 /// Selects which connected surface of the first frame is tracked, if there are several.
@@ -123,6 +124,80 @@ pub enum Cavity {
     Open,
 }
 
+/// How much a [`SurfaceTracker`] may work with; by default, as much as fits into memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TrackingLimits {
+    /// The largest number of vertices of the surface, at most and by default four million. The contour of all bright
+    /// objects of the box, which the surface is chosen from, has at most eight times as many triangles.
+    pub max_vertices: Option<usize>,
+    /// The largest number of voxels of the box in one frame, with two more on every side, for steps; all frames together
+    /// have at most eight times as many. The boundary of all frames together has at most as many points.
+    pub max_voxels: Option<usize>,
+}
+
+/// The largest number of triangles of a contour for each vertex that a surface may have, and of all: as much as there is
+/// memory to work with.
+const TRIANGLES_PER_VERTEX: usize = 8;
+const MOST_TRIANGLES: usize = 8_000_000;
+
+/// The largest number of voxels of all frames, as a multiple of that of one: each takes a byte for its intensity, and one
+/// for its level.
+const ALL_FRAMES: usize = 8;
+
+impl TrackingLimits {
+    fn vertices(&self) -> usize {
+        self.max_vertices.map_or(MAX_VERTICES, |most| most.min(MAX_VERTICES))
+    }
+
+    /// Returns the largest number of triangles of a contour.
+    fn triangles(&self) -> usize {
+        self.vertices().saturating_mul(TRIANGLES_PER_VERTEX).min(MOST_TRIANGLES)
+    }
+
+    /// Checks the number of voxels of a box with padding, and of all frames.
+    ///
+    /// # Errors
+    /// [`MethodError::TooLarge`].
+    fn check_voxels(&self, dims: [usize; 3], frames: usize) -> Result<(), MethodError> {
+        let voxels: usize = dims.iter().product();
+        let fits = |most: usize| voxels <= most && voxels.saturating_mul(frames) / ALL_FRAMES <= most;
+        if self.max_voxels.is_none_or(fits) { Ok(()) } else { Err(too_many_voxels(dims, frames)) }
+    }
+
+    fn points(&self) -> usize {
+        self.max_voxels.unwrap_or(usize::MAX)
+    }
+
+    /// Checks the boundary of a frame before its contour is made, which takes long. A contour has two triangles for each
+    /// face between bright and dark voxels, or fewer where it is smoother: with a third fewer it is certainly too large.
+    ///
+    /// # Errors
+    /// [`MethodError::TooLarge`].
+    fn check_faces(&self, faces: &Faces) -> Result<(), MethodError> {
+        let walls = faces[..TIME].iter().flatten().filter(|face| face.weight >= MIN_WEIGHT).count();
+        if walls <= self.triangles() / 4 * 3 {
+            return Ok(());
+        }
+        Err(too_much_boundary())
+    }
+
+    /// Checks the number of vertices of a tracked surface.
+    ///
+    /// # Errors
+    /// [`MethodError::TooLarge`].
+    fn check_vertices(&self, count: usize) -> Result<(), MethodError> {
+        if count <= self.vertices() {
+            return Ok(());
+        }
+        let problem = format!(
+            "the surface would have more than {} vertices: use a smaller box, a higher edge threshold, or an image with \
+             fewer voxels",
+            self.vertices()
+        );
+        Err(MethodError::TooLarge { problem })
+    }
+}
+
 /// Options to create a [`SurfaceTracker`].
 #[derive(Clone, Debug)]
 pub struct TrackingOptions {
@@ -138,6 +213,8 @@ pub struct TrackingOptions {
     pub start: Option<TriangleMesh>,
     /// The inside of the tracked surface.
     pub cavity: Cavity,
+    /// How much the tracker may work with.
+    pub limits: TrackingLimits,
     /// The initial parameters; `threshold`, `radius` and `time_scale` are derived from the volume if they are 0.
     pub params: TrackingParams,
 }
@@ -158,6 +235,7 @@ pub struct SurfaceTracker {
     /// The caller's mesh for the first frame; empty without one.
     start: Mesh,
     cavity: Cavity,
+    limits: TrackingLimits,
     /// By frame, the voxels of the region that are filled, since the cavity is closed; none before the boundary is found.
     filled: Vec<Vec<Filled>>,
     /// Identifies the input in saved states.
@@ -241,7 +319,7 @@ impl SurfaceTracker {
     /// Those of [`Self::new`].
     pub async fn new_in_slices(options: TrackingOptions) -> Result<Self, MethodError> {
         let pauses = Pauses::default();
-        let TrackingOptions { volume, bounds, component, start, cavity, params } = options;
+        let TrackingOptions { volume, bounds, component, start, cavity, limits, params } = options;
         params.validate()?;
         if volume.frames() < 2 {
             let problem = "must have at least two frames, got one";
@@ -260,6 +338,7 @@ impl SurfaceTracker {
             Some(mesh) => start::validate_start(mesh, &region, &pauses).await?,
             None => region.space.empty_mesh(),
         };
+        limits.check_vertices(start.vertex_count())?;
         pauses.now().await;
         let mut tracker = Self {
             voting: BoundaryVoting::new(Window::default(), 0),
@@ -268,6 +347,7 @@ impl SurfaceTracker {
             component,
             start,
             cavity,
+            limits,
             filled: Vec::new(),
             fingerprint: 0,
             params: TrackingParams::default(),
@@ -452,7 +532,8 @@ impl SurfaceTracker {
     /// is done, calls change nothing and report `done`.
     ///
     /// # Errors
-    /// [`MethodError::InvalidArgument`] if there is no boundary or no closed surface; [`MethodError::Mesh`] and
+    /// [`MethodError::InvalidArgument`] if there is no boundary or no closed surface; [`MethodError::TooLarge`] beyond
+    /// [`TrackingOptions::limits`]; [`MethodError::Mesh`] and
     /// [`MethodError::Volume`] if memory does not suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         finished(self.step_in_slices())
@@ -471,16 +552,22 @@ impl SurfaceTracker {
         if self.is_done() {
             return Ok(self.report(changes, times));
         }
+        self.limits.check_voxels(self.region.dims, self.frames())?;
         if self.faces.len() < self.frames() {
             let frame = self.faces.len();
             if self.cavity == Cavity::Closed && self.filled.is_empty() {
                 self.close_cavity(&pauses).await;
             }
-            let faces = self.voting.faces(&self.region, frame, &pauses).await;
+            let found: usize = self.faces.iter().flatten().map(Vec::len).sum();
+            let most = self.limits.points().saturating_sub(found);
+            let faces = self.voting.faces(&self.region, frame, most, &pauses).await?;
+            self.limits.check_faces(&faces)?;
             self.faces.push(faces);
             times.add("boundary", (self.clock)() - began);
         } else if self.meshes.len() < self.frames() {
-            changes = self.next_frame(&pauses).await?;
+            let result = self.next_frame(&pauses).await;
+            self.keep_votes(result.is_ok());
+            changes = result?;
             times.add("surface", (self.clock)() - began);
         } else {
             self.close_cycle(&pauses).await;
@@ -499,7 +586,7 @@ impl SurfaceTracker {
 
     /// Undoes what a step has changed that was dropped at a pause; see [`Self::step_in_slices`].
     pub fn discard_step(&mut self) {
-        self.end_own_windows(false);
+        self.keep_votes(false);
     }
 
     /// Returns the number of frames of the volume.
@@ -522,19 +609,19 @@ impl SurfaceTracker {
             let tracker =
                 tracker.unwrap_or_else(|| FrameTracker::new(measure(&last.to_triangles()).edge_mean));
             let (edge, from) = (tracker.edge, self.samples.clone());
-            let found = self.follow(&last, tracker, from.as_deref(), frame, pauses).await;
+            let found = self.follow(&last, tracker, from.as_deref(), frame, pauses).await?;
             self.frame_tracker = Some(FrameTracker::new(edge));
             if let Some(found) = found {
                 return match self.extracted_instead(&found, frame, pauses).await? {
-                    Some(instead) => Ok(self.set_begun_frame(instead)),
-                    None => Ok(self.set_frame(found)),
+                    Some(instead) => self.set_begun_frame(instead, pauses).await,
+                    None => Ok(self.set_frame(found, pauses).await?.0),
                 };
             }
         }
         // Nothing else begins where a caller's start ends.
         let may_begin = frame > 0 || !has_surface;
         match if may_begin { self.begin(&last, frame, pauses).await? } else { None } {
-            Some(found) => Ok(self.set_begun_frame(found)),
+            Some(found) => self.set_begun_frame(found, pauses).await,
             None => {
                 self.set_empty_frame();
                 Ok(Changes::default())
@@ -544,27 +631,41 @@ impl SurfaceTracker {
 
     /// Adds the next frame with the surface that begins there, in place of the one before, if there is one; returns the edits
     /// of the mesh.
-    fn set_begun_frame(&mut self, found: Tracked) -> Changes {
-        let replaced = std::mem::take(&mut self.mesh);
+    ///
+    /// # Errors
+    /// Those of [`Self::set_frame`].
+    async fn set_begun_frame(&mut self, found: Tracked, pauses: &Pauses) -> Result<Changes, MethodError> {
+        let frame = self.meshes.len() as u32;
+        let (changes, replaced) = self.set_frame(found, pauses).await?;
         if replaced.vertex_count() > 0 {
-            self.lost.push(self.meshes.len() as u32);
+            self.lost.push(frame);
         }
-        let changes = self.set_frame(found);
         self.mesh.advance_versions_past(&replaced);
-        changes
+        Ok(changes)
     }
 
-    /// Adds the next frame with the surface tracked into it; returns the edits of the mesh.
-    fn set_frame(&mut self, found: Tracked) -> Changes {
-        let space = self.region.space;
-        self.mesh = found.mesh;
-        space.leave(&mut self.mesh);
+    /// Adds the next frame with the surface tracked into it, after the last pause; returns the edits of the mesh, and the
+    /// mesh before.
+    ///
+    /// # Errors
+    /// [`MethodError::TooLarge`] if it has more vertices than allowed; nothing has changed then.
+    async fn set_frame(&mut self, found: Tracked, pauses: &Pauses) -> Result<(Changes, Mesh), MethodError> {
+        self.limits.check_vertices(found.mesh.vertex_count())?;
+        let (frame, space) = (self.meshes.len(), self.region.space);
+        let mut mesh = found.mesh;
+        space.leave(&mut mesh);
+        let surface = TriangleMesh { normals: None, ..mesh.to_triangles() };
+        pauses.after(mesh.slots()).await;
+        let intensities = self.measured_intensities(frame, &surface);
+        pauses.after(mesh.slots()).await;
+        let facts = self.measured_facts(frame, &surface, intensities, pauses).await;
+        let replaced = std::mem::replace(&mut self.mesh, mesh);
         (self.frame_tracker, self.samples) = (Some(found.tracker), Some(found.samples));
-        self.meshes.push(TriangleMesh { normals: None, ..self.mesh.to_triangles() });
+        self.meshes.push(surface);
         self.statistics.push(space.statistics(found.statistics));
-        self.intensities_at_surface.push(self.measured_intensities(self.meshes.len() - 1));
-        self.facts.push(self.measured_facts(self.meshes.len() - 1));
-        found.changes
+        self.intensities_at_surface.push(intensities);
+        self.facts.push(facts);
+        Ok((found.changes, replaced))
     }
 
     /// Adds the next frame without a surface.
@@ -605,25 +706,26 @@ impl SurfaceTracker {
 
     /// Collects the boundary points around the newest tracked frame in time; `None` before the first frame is tracked.
     fn newest_samples(&self) -> Option<Arc<SpaceTimeSamples>> {
-        self.meshes.len().checked_sub(1).map(|frame| Arc::new(self.samples_around(frame)))
+        self.meshes
+            .len()
+            .checked_sub(1)
+            .map(|frame| Arc::new(finished(self.samples_around(frame, &Pauses::default()))))
     }
 
     /// Collects the boundary points of a frame and of those around it in time, for plane fits in that frame.
-    fn samples_around(&self, frame: usize) -> SpaceTimeSamples {
+    async fn samples_around(&self, frame: usize, pauses: &Pauses) -> SpaceTimeSamples {
         let (count, falloff) = (self.frames(), self.falloff());
-        let mut field = SampleField::new(&self.region, falloff);
         // In a cycle, no frame is added twice.
         let most = if self.params.cyclic { (count - 1) / 2 } else { count - 1 };
-        for offset in falloff.offsets(most) {
-            let at = frame as i64 + offset;
-            if self.params.cyclic || (0..count as i64).contains(&at) {
-                field.add(&self.faces[at.rem_euclid(count as i64) as usize], offset);
-            }
-        }
+        let offsets = falloff.offsets(most).map(|offset| (offset, frame as i64 + offset));
+        let near = offsets.filter(|(_, at)| self.params.cyclic || (0..count as i64).contains(at));
+        let frames: Vec<_> =
+            near.map(|(offset, at)| (offset, &self.faces[at.rem_euclid(count as i64) as usize])).collect();
+        let field = SampleField::of(&self.region, falloff, &frames, pauses).await;
         let shortest_side = self.region.spacing.min_element();
         let (damping, time_scale) = (self.params.damping, falloff.time_scale);
-        let box_side_voxels = self.region.bright_box_side_voxels(&self.faces[frame]);
-        let own = SampleField::single_frame(&self.region, falloff, &self.faces[frame]);
+        let box_side_voxels = self.region.bright_box_side_voxels(&self.faces[frame], pauses).await;
+        let own = SampleField::single_frame(&self.region, falloff, &self.faces[frame], pauses).await;
         SpaceTimeSamples {
             field,
             own,

@@ -65,10 +65,11 @@ impl SurfaceTracker {
         voting: &BoundaryVoting,
         pauses: &Pauses,
     ) -> Tracked {
-        let samples = self.samples_around(frame);
+        let samples = self.samples_around(frame, pauses).await;
         let params = &self.region.space.params(&self.params);
         let context = FrameContext { region: &self.region, params, frame, samples: &samples, voting, pauses };
         let (changes, statistics) = tracker.track_frame(&mut mesh, from, &context).await;
+        pauses.now().await;
         let voxel = self.region.spacing.element_product();
         let is_present = statistics.volume >= voxel && context.is_present(&mesh, &statistics);
         let samples = Arc::new(samples);
@@ -78,6 +79,9 @@ impl SurfaceTracker {
     /// Tracks the surface of the frame before, `mesh` in the working space, into a frame; `None` if the frame has no
     /// object there. If windows over several frames find none, the votes of the frame are replaced by those of windows
     /// within the frame, provided that these find one.
+    ///
+    /// # Errors
+    /// [`MethodError::TooLarge`] if these have too many.
     pub(super) async fn follow(
         &mut self,
         mesh: &Mesh,
@@ -85,20 +89,22 @@ impl SurfaceTracker {
         from: Option<&SpaceTimeSamples>,
         frame: usize,
         pauses: &Pauses,
-    ) -> Option<Tracked> {
+    ) -> Result<Option<Tracked>, MethodError> {
         if self.region.is_blank(frame) {
-            return None;
+            return Ok(None);
         }
         let edge = tracker.edge;
         self.voting.ensure_levels(&self.region, frame, pauses).await;
         let first = self.tracked(mesh.clone(), tracker, from, frame, &self.voting, pauses).await;
         if first.is_present {
-            return Some(first);
+            return Ok(Some(first));
         }
-        let voting = self.use_own_windows(frame, pauses).await?;
+        let Some(voting) = self.use_own_windows(frame, pauses).await? else { return Ok(None) };
         let again = self.tracked(mesh.clone(), FrameTracker::new(edge), from, frame, &voting, pauses).await;
-        self.end_own_windows(again.is_present);
-        again.is_present.then_some(again)
+        if !again.is_present {
+            self.keep_votes(false);
+        }
+        Ok(again.is_present.then_some(again))
     }
 
     /// Returns the surface extracted from a frame where one was tracked into it, if many of the projections of that one fail,
@@ -120,12 +126,15 @@ impl SurfaceTracker {
             return Ok(None);
         }
         let inside = inside_voxels(&self.region, &tracked.mesh.to_triangles());
-        let shared = |part: &TriangleMesh| inside_voxels(&self.region, part).intersection(&inside).count();
-        let parts = self.surfaces_in(frame, pauses).await?.into_iter().map(|part| (shared(&part), part));
-        let Some((_, part)) = parts.filter(|(shared, _)| *shared > 0).max_by_key(|(shared, _)| *shared)
-        else {
-            return Ok(None);
-        };
+        let mut best: Option<(usize, TriangleMesh)> = None;
+        for part in self.surfaces_in(frame, pauses).await? {
+            let shared = inside_voxels(&self.region, &part).intersection(&inside).count();
+            pauses.now().await;
+            if shared > 0 && best.as_ref().is_none_or(|(most, _)| shared >= *most) {
+                best = Some((shared, part));
+            }
+        }
+        let Some((_, part)) = best else { return Ok(None) };
         let found = self.begun_at(&part, frame, &self.voting, pauses).await?;
         let is_better = found.is_present && rejected_share(&found.statistics, passes) < 0.5 * now;
         Ok(is_better.then_some(found))
@@ -157,9 +166,11 @@ impl SurfaceTracker {
         if let Some(found) = self.begin_with(last, frame, &self.voting, pauses).await? {
             return Ok(Some(found));
         }
-        let Some(voting) = self.use_own_windows(frame, pauses).await else { return Ok(None) };
+        let Some(voting) = self.use_own_windows(frame, pauses).await? else { return Ok(None) };
         let found = self.begin_with(last, frame, &voting, pauses).await;
-        self.end_own_windows(matches!(found, Ok(Some(_))));
+        if !matches!(found, Ok(Some(_))) {
+            self.keep_votes(false);
+        }
         found
     }
 
@@ -175,11 +186,16 @@ impl SurfaceTracker {
             return Ok(None);
         }
         let known = self.known_before(last, frame, pauses).await;
-        let Some(part) =
-            self.tracked_component(parts.into_iter().filter(|part| !self.is_known(part, &known)))
-        else {
-            return Ok(None);
-        };
+        let mut new = Vec::new();
+        for part in parts {
+            if !self.is_known(&part, &known) {
+                new.push(part);
+            }
+            if frame > 0 {
+                pauses.now().await;
+            }
+        }
+        let Some(part) = self.tracked_component(new, pauses).await else { return Ok(None) };
         let found = self.begun_at(&part, frame, voting, pauses).await?;
         // In the first frame there is nothing to compare with, and what was extracted is given.
         Ok((found.is_present || frame == 0).then_some(found))
@@ -193,7 +209,7 @@ impl SurfaceTracker {
         voting: &BoundaryVoting,
         pauses: &Pauses,
     ) -> Result<Tracked, MethodError> {
-        let mesh = self.remeshed(part)?;
+        let mesh = self.remeshed(part, pauses).await?;
         pauses.after(mesh.triangle_count()).await;
         let edge = match &self.frame_tracker {
             Some(tracker) => tracker.edge,
@@ -202,24 +218,32 @@ impl SurfaceTracker {
         Ok(self.tracked(mesh, FrameTracker::new(edge), None, frame, voting, pauses).await)
     }
 
-    /// Replaces the votes of a frame by those of windows within it, until [`Self::end_own_windows`] is called, and returns
+    /// Replaces the votes of a frame by those of windows within it, until [`Self::keep_votes`] is called, and returns
     /// their levels; `None` if windows are of single frames anyway.
-    async fn use_own_windows(&mut self, frame: usize, pauses: &Pauses) -> Option<BoundaryVoting> {
+    ///
+    /// # Errors
+    /// [`MethodError::TooLarge`] if there are too many.
+    async fn use_own_windows(
+        &mut self,
+        frame: usize,
+        pauses: &Pauses,
+    ) -> Result<Option<BoundaryVoting>, MethodError> {
         if self.params.window_frames == 0 {
-            return None;
+            return Ok(None);
         }
         let window = Window { frames: 0, ..self.voting.window() };
         let mut voting = BoundaryVoting::new(window, self.frames());
-        let mut faces = voting.faces(&self.region, frame, pauses).await;
+        let mut faces = voting.faces(&self.region, frame, self.limits.points(), pauses).await?;
+        self.limits.check_faces(&faces)?;
         // Faces along time have no windows within one frame.
         faces[super::vote::TIME].clone_from(&self.faces[frame][super::vote::TIME]);
         let several = std::mem::replace(&mut self.faces[frame], faces);
         self.replaced_faces = Some((frame, several));
-        Some(voting)
+        Ok(Some(voting))
     }
 
-    /// Keeps the votes of windows within a frame, or takes those that they replaced again.
-    pub(super) fn end_own_windows(&mut self, keeps: bool) {
+    /// Keeps the votes of windows within a frame if there are any, or takes those that they replaced again.
+    pub(super) fn keep_votes(&mut self, keeps: bool) {
         if let (Some((frame, several)), false) = (self.replaced_faces.take(), keeps) {
             self.faces[frame] = several;
         }

@@ -99,6 +99,7 @@ mod tests {
     use super::super::working_space::WorkingSpace;
     use super::*;
     use crate::math::DAffine3;
+    use crate::pauses::{Pauses, finished};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -142,12 +143,11 @@ mod tests {
 
     fn moving_plane(normal: DVec3, distance: f64, speed: f64) -> SpaceTimeSamples {
         let region = region();
-        let mut field = SampleField::new(&region, FALLOFF);
-        for offset in FALLOFF.offsets(9) {
-            field.add(&plane_faces(&region, normal, distance, speed, offset as f64), offset);
-        }
-        let own =
-            SampleField::single_frame(&region, FALLOFF, &plane_faces(&region, normal, distance, speed, 0.0));
+        let faces = |offset: i64| plane_faces(&region, normal, distance, speed, offset as f64);
+        let frames: Vec<_> = FALLOFF.offsets(9).map(|offset| (offset, faces(offset))).collect();
+        let frames: Vec<_> = frames.iter().map(|(offset, faces)| (*offset, faces)).collect();
+        let field = finished(SampleField::of(&region, FALLOFF, &frames, &Pauses::default()));
+        let own = finished(SampleField::single_frame(&region, FALLOFF, &faces(0), &Pauses::default()));
         SpaceTimeSamples {
             field,
             own,
@@ -167,10 +167,9 @@ mod tests {
             let normal = DVec3::new(0.6, 0.0, 0.8);
             let frames: Vec<Faces> =
                 (-5..=5).map(|t| plane_faces(&region, normal, 12.0, 0.3, f64::from(t))).collect();
-            let mut field = SampleField::new(&region, falloff);
-            for offset in falloff.offsets(5) {
-                field.add(&frames[(offset + 5) as usize], offset);
-            }
+            let near: Vec<_> =
+                falloff.offsets(5).map(|offset| (offset, &frames[(offset + 5) as usize])).collect();
+            let field = finished(SampleField::of(&region, falloff, &near, &Pauses::default()));
             for at in [DVec3::new(9.3, 10.1, 8.7), DVec3::new(0.2, 21.0, 15.0)] {
                 let sums = field.sums(at);
                 let (mut weight, mut first, mut second) = (0.0, [0.0; 4], [0.0; 10]);

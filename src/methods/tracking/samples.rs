@@ -5,8 +5,9 @@
 //! separable over the axes. So the frames are summed once, and each query sums along rows of voxels only.
 
 use super::region::Region;
-use super::vote::{Faces, TIME, X, Y, Z};
+use super::vote::{Face, Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
+use crate::pauses::Pauses;
 use wide::f32x8;
 
 /// Weights of boundary points in plane fits, by distance: θ(r) = exp(−r²/h²), with r in space-time.
@@ -52,6 +53,10 @@ const MAX_VECTORS: usize = 4;
 /// it.
 pub(super) const MAX_FACES: usize = MAX_VECTORS * LANES;
 
+/// Number of boundary points between two pauses, and of those that count as one unit of work.
+const POINTS_PER_CHUNK: usize = 1 << 16;
+const POINTS_PER_UNIT: usize = 256;
+
 /// The boundary points around one frame, as weights on the faces between voxels; answers queries for [`Sums`], to which
 /// planes are fitted.
 #[derive(Clone, Debug)]
@@ -59,9 +64,7 @@ pub(super) struct SampleField {
     dims: [usize; 3],
     spacing: DVec3,
     falloff: Falloff,
-    /// Length of a row of weights along x with its padding.
-    stride: usize,
-    /// Number of zeros at either end of a row of weights along x, for queries near the border.
+    /// Number of zeros at either end of a row of weights along x, for queries near its ends.
     padding: usize,
     /// By axis, the constant factor by which the ratio of the weight θ between neighbouring voxels changes from voxel
     /// to voxel; it saves exponentials.
@@ -77,22 +80,56 @@ pub(super) struct SampleField {
 #[derive(Clone, Debug, Default)]
 struct FaceWeights {
     weights: [Vec<f32>; 3],
-    /// For each row along x, the first voxel with a weight and the one after the last, so that queries skip empty rows.
+    /// For each row along x, the first voxel with a weight and the one after the last: queries skip empty rows, and
+    /// there are no weights elsewhere, since most rows of most images have few.
     extents: Vec<[u32; 2]>,
+    /// For each row along x, the index of its first weight, which is one of its padding.
+    starts: Vec<u32>,
+}
+
+impl FaceWeights {
+    /// Creates lists for the points of `sources`, `count` of them, in `lines` rows of `nx` voxels.
+    async fn new(
+        sources: &[(&[Face], f64)],
+        [nx, lines]: [usize; 2],
+        padding: usize,
+        count: usize,
+        pauses: &Pauses,
+    ) -> Self {
+        let mut extents = vec![[u32::MAX, 0]; lines];
+        for faces in sources.iter().flat_map(|(faces, _)| faces.chunks(POINTS_PER_CHUNK)) {
+            for face in faces {
+                let [first, end] = &mut extents[face.voxel as usize / nx];
+                let x = (face.voxel as usize % nx) as u32;
+                (*first, *end) = ((*first).min(x), (*end).max(x + 1));
+            }
+            pauses.after(faces.len() / POINTS_PER_UNIT).await;
+        }
+        let mut len = 0;
+        let mut starts = Vec::with_capacity(lines);
+        for [first, end] in &extents {
+            starts.push(len as u32);
+            len += end.checked_sub(*first).map_or(0, |count| count as usize + 2 * padding);
+        }
+        let mut weights: [Vec<f32>; 3] = Default::default();
+        for list in weights.iter_mut().take(count) {
+            *list = vec![0.0; len];
+            pauses.after(len / POINTS_PER_UNIT / 8).await;
+        }
+        Self { weights, extents, starts }
+    }
 }
 
 impl SampleField {
-    /// Creates a field without boundary points, to which those of several frames can be added.
-    pub fn new(region: &Region, falloff: Falloff) -> Self {
+    /// Creates a field without boundary points.
+    fn new(region: &Region, falloff: Falloff) -> Self {
         let most = (2.0 * falloff.radius / region.spacing.x) as usize + 1;
-        let padding = most + 1 + if most <= LANES { LANES } else { MAX_FACES };
+        let padding = if most <= LANES { LANES } else { MAX_FACES };
         let change = |k: usize| falloff.ratio(region.spacing[k] / 2.0, region.spacing[k]);
-        let row = region.dims[0] + 2 * padding;
         Self {
             dims: region.dims,
             spacing: region.spacing,
             falloff,
-            stride: row,
             padding,
             changes: DVec3::new(change(0), change(1), change(2)),
             has_times: true,
@@ -100,46 +137,55 @@ impl SampleField {
         }
     }
 
-    /// Creates a field with the points of a single frame, without points on faces along time.
-    pub fn single_frame(region: &Region, falloff: Falloff, faces: &Faces) -> Self {
-        let mut field = Self { has_times: false, ..Self::new(region, falloff) };
-        for direction in [X, Y, Z] {
-            field.add_direction(direction, faces, 0.0);
+    /// Creates a field with the points of several frames, each with the number of frames by which it is after that of the
+    /// field; those beyond the radius in time are left out.
+    pub async fn of(region: &Region, falloff: Falloff, frames: &[(i64, &Faces)], pauses: &Pauses) -> Self {
+        let mut field = Self::new(region, falloff);
+        for direction in [X, Y, Z, TIME] {
+            // Faces along time are half a frame after their frame.
+            let later = if direction == TIME { 0.5 } else { 0.0 };
+            let timed = frames.iter().map(|&(offset, faces)| {
+                (&faces[direction][..], (offset as f64 + later) * falloff.time_scale)
+            });
+            let near: Vec<_> = timed.filter(|(_, time)| time.abs() < falloff.radius).collect();
+            field.set_direction(direction, &near, pauses).await;
         }
         field
     }
 
-    /// Adds the boundary points of the frame that is `offset` frames after that of the field; those beyond the radius
-    /// in time are left out.
-    pub fn add(&mut self, faces: &Faces, offset: i64) {
-        for direction in [X, Y, Z, TIME] {
-            // Faces along time are half a frame after their frame.
-            let frames = offset as f64 + if direction == TIME { 0.5 } else { 0.0 };
-            let time = frames * self.falloff.time_scale;
-            if time.abs() < self.falloff.radius {
-                self.add_direction(direction, faces, time);
-            }
+    /// Creates a field with the points of a single frame, without points on faces along time.
+    pub async fn single_frame(region: &Region, falloff: Falloff, faces: &Faces, pauses: &Pauses) -> Self {
+        let mut field = Self { has_times: false, ..Self::new(region, falloff) };
+        for direction in [X, Y, Z] {
+            field.set_direction(direction, &[(&faces[direction][..], 0.0)], pauses).await;
         }
+        field
     }
 
-    fn add_direction(&mut self, direction: usize, faces: &Faces, time: f64) {
+    /// Sets the boundary points on the faces of one direction, in lists each with its time.
+    async fn set_direction(&mut self, direction: usize, sources: &[(&[Face], f64)], pauses: &Pauses) {
+        if sources.is_empty() {
+            return;
+        }
         let [nx, ny, nz] = self.dims;
-        let theta = self.falloff.theta(time);
-        let factors = [theta, theta * time, theta * time * time].map(|factor| factor as f32);
-        let FaceWeights { weights, extents } = &mut self.sites[direction];
-        if extents.is_empty() {
-            extents.resize(ny * nz, [u32::MAX, 0]);
-            let lists = weights.iter_mut().take(if self.has_times { 3 } else { 1 });
-            lists.for_each(|list| list.resize(self.stride * ny * nz, 0.0));
-        }
-        for face in &faces[direction] {
-            let (line, x) = (face.voxel as usize / nx, face.voxel as usize % nx);
-            for (list, factor) in weights.iter_mut().zip(factors).filter(|(list, _)| !list.is_empty()) {
-                list[line * self.stride + self.padding + x] += factor * face.weight;
+        let count = if self.has_times { 3 } else { 1 };
+        let mut site = FaceWeights::new(sources, [nx, ny * nz], self.padding, count, pauses).await;
+        for &(faces, time) in sources {
+            let theta = self.falloff.theta(time);
+            let factors = [theta, theta * time, theta * time * time].map(|factor| factor as f32);
+            for faces in faces.chunks(POINTS_PER_CHUNK) {
+                for face in faces {
+                    let (line, x) = (face.voxel as usize / nx, face.voxel as usize % nx);
+                    let from = site.starts[line] as usize + self.padding;
+                    let at = from + x - site.extents[line][0] as usize;
+                    for (list, factor) in site.weights.iter_mut().take(count).zip(factors) {
+                        list[at] += factor * face.weight;
+                    }
+                }
+                pauses.after(faces.len() / POINTS_PER_UNIT).await;
             }
-            let [first, end] = &mut extents[line];
-            (*first, *end) = ((*first).min(x as u32), (*end).max(x as u32 + 1));
         }
+        self.sites[direction] = site;
     }
 
     /// Returns weighted sums over all boundary points around a position in the frame, from which a plane is fitted.
@@ -151,13 +197,10 @@ impl SampleField {
         let axes = [[axis(0, 0.0), axis(0, 0.5)], [axis(1, 0.0), axis(1, 0.5)], [axis(2, 0.0), axis(2, 0.5)]];
         for direction in [X, Y, Z, TIME] {
             let [x, y, z] = [X, Y, Z].map(|k| &axes[k][usize::from(direction == k)]);
-            // There are no points off the grid.
-            let padding = self.padding as i64;
-            let outside = x.first < -padding || x.end() > self.dims[0] as i64 + padding;
-            if outside || self.sites[direction].extents.is_empty() {
+            let sites = &self.sites[direction];
+            if sites.extents.is_empty() {
                 continue;
             }
-            let sites = &self.sites[direction];
             match (x.count <= LANES, self.has_times) {
                 (true, true) => self.gather::<1, true>(sites, [x, y, z], &mut sums),
                 (true, false) => self.gather::<1, false>(sites, [x, y, z], &mut sums),
@@ -189,7 +232,7 @@ impl SampleField {
                 if dy * dy + dz * dz >= square || first >= near[1] || end <= near[0] {
                     continue;
                 }
-                let from = ((line * self.stride + self.padding) as i64 + x.first) as usize;
+                let from = (i64::from(sites.starts[line]) + self.padding as i64 + x.first - first) as usize;
                 let row = |power: usize| lanes(&sites.weights[power][from..from + N * LANES]);
                 rows.add(&row(0), dy as f32, y.weight(j));
                 if TIMED {

@@ -5,11 +5,11 @@ use super::first::extract_bright_surface;
 use super::region::Region;
 use super::{Component, SurfaceTracker};
 use crate::math::{Vec3, triangle};
-use crate::mesh::{Mesh, TriangleMesh, measure};
+use crate::mesh::{Mesh, TriangleMesh, enclosed_volume, measure};
 use crate::methods::MethodError;
 use crate::methods::caller_mesh::checked_mesh;
 use crate::pauses::Pauses;
-use crate::remesh::{EdgeBounds, remesh};
+use crate::remesh::{EdgeBounds, remesh_in_slices};
 
 /// Target edge length of the mesh extracted from the first frame, in units of the shortest side of a voxel.
 const EDGE: f64 = 1.2;
@@ -17,6 +17,17 @@ const EDGE: f64 = 1.2;
 /// Ratio of the longest accepted edge of the mesh extracted from the first frame to the target edge length, and of that
 /// to the shortest.
 const EDGE_BOUND_RATIO: f32 = 1.5;
+
+/// Vertices of an extracted surface for each one that is left at least, once its edges are of even lengths: about two.
+const MOST_REMOVED: usize = 2;
+
+/// Number of triangles that count as one unit of work between pauses.
+const TRIANGLES_PER_UNIT: usize = 32;
+
+/// Returns the work that visiting all triangles of a part is.
+fn part_work(part: &TriangleMesh) -> usize {
+    1 + part.triangles.len() / TRIANGLES_PER_UNIT
+}
 
 /// Smallest mean edge of a caller's mesh, in units of the shortest side of a voxel. The resolution of that mesh is
 /// kept: with shorter edges, a surface as large as the image would have more triangles than fit into memory.
@@ -91,41 +102,65 @@ impl SurfaceTracker {
         pauses: &Pauses,
     ) -> Result<Vec<TriangleMesh>, MethodError> {
         let faces = &self.faces[frame];
-        let surface = extract_bright_surface(&self.region, frame, faces, self.falloff(), pauses).await?;
-        let mut parts = surface.components();
-        parts.retain(|part| measure(part).volume > 0.0);
-        Ok(parts)
+        let (falloff, most) = (self.falloff(), self.limits.triangles());
+        let surface = extract_bright_surface(&self.region, frame, faces, falloff, most, pauses).await?;
+        let mut outer = Vec::new();
+        for part in surface.separate_components(pauses).await {
+            pauses.after(part_work(&part)).await;
+            if enclosed_volume(&part) > 0.0 {
+                outer.push(part);
+            }
+        }
+        Ok(outer)
     }
 
     /// Returns the component to be tracked, selected by the option `component`, from closed surfaces in a frame; `None` if
     /// there are none.
-    pub(super) fn tracked_component(
+    pub(super) async fn tracked_component(
         &self,
-        parts: impl Iterator<Item = TriangleMesh>,
+        parts: Vec<TriangleMesh>,
+        pauses: &Pauses,
     ) -> Option<TriangleMesh> {
-        let scored = parts.map(|part| match self.component {
-            Component::Largest => (-measure(&part).volume, part),
-            Component::Nearest(p) => (distance(&part, self.region.space.point(p).as_vec3()), part),
-        });
-        scored.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, part)| part)
+        let mut best: Option<(f64, TriangleMesh)> = None;
+        for part in parts {
+            let score = match self.component {
+                Component::Largest => -enclosed_volume(&part),
+                Component::Nearest(p) => distance(&part, self.region.space.point(p).as_vec3(), pauses).await,
+            };
+            pauses.after(part_work(&part)).await;
+            if best.as_ref().is_none_or(|(least, _)| score.total_cmp(least).is_lt()) {
+                best = Some((score, part));
+            }
+        }
+        best.map(|(_, part)| part)
     }
 
     /// Returns an extracted surface as a mesh with edges of even lengths, in the working space.
     ///
     /// # Errors
-    /// [`MethodError::Mesh`] if memory does not suffice.
-    pub(super) fn remeshed(&self, part: &TriangleMesh) -> Result<Mesh, MethodError> {
+    /// [`MethodError::TooLarge`] if it has far more vertices than allowed; [`MethodError::Mesh`] if memory does not suffice.
+    pub(super) async fn remeshed(&self, part: &TriangleMesh, pauses: &Pauses) -> Result<Mesh, MethodError> {
+        self.limits.check_vertices(part.positions.len() / MOST_REMOVED)?;
         let mut mesh = Mesh::from_triangles(part)?;
+        pauses.now().await;
         let edge = (EDGE * self.region.spacing.min_element()) as f32;
-        remesh(&mut mesh, EdgeBounds { min: edge / EDGE_BOUND_RATIO, max: edge * EDGE_BOUND_RATIO })?;
+        let bounds = EdgeBounds { min: edge / EDGE_BOUND_RATIO, max: edge * EDGE_BOUND_RATIO };
+        remesh_in_slices(&mut mesh, bounds, pauses).await?;
+        self.limits.check_vertices(mesh.vertex_count())?;
         Ok(mesh)
     }
 }
 
 /// Returns the distance of a point from the nearest vertex of a closed surface; 0 if the point is
 /// inside. It selects the tracked component.
-fn distance(part: &TriangleMesh, p: Vec3) -> f64 {
-    let angle: f64 = part.corners().map(|corners| triangle::solid_angle(corners, p)).sum();
+async fn distance(part: &TriangleMesh, p: Vec3, pauses: &Pauses) -> f64 {
+    let mut angle = 0.0;
+    for (i, corners) in part.corners().enumerate() {
+        angle += triangle::solid_angle(corners, p);
+        if i % TRIANGLES_PER_UNIT == 0 {
+            pauses.after(1).await;
+        }
+    }
     if angle.abs() > std::f64::consts::TAU {
         return 0.0;
     }

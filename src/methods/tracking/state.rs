@@ -10,6 +10,7 @@ use crate::math::Vec3;
 use crate::mesh::{Mesh, TriangleMesh};
 use crate::methods::MethodError;
 use crate::methods::saved::{Hash, Magic, can_be_checked, decode, encode};
+use crate::pauses::{Pauses, finished};
 use serde::{Deserialize, Serialize};
 
 const MAGIC: Magic = *b"VSCLTRK\x01";
@@ -129,6 +130,12 @@ impl SurfaceTracker {
         {
             return bad("surface", "inconsistent");
         }
+        let points: usize = state.faces.iter().flatten().map(Vec::len).sum();
+        let is_allowed = points <= self.limits.points()
+            && meshes.iter().all(|mesh| mesh.positions.len() <= self.limits.vertices());
+        if !is_allowed || state.faces.iter().any(|faces| self.limits.check_faces(faces).is_err()) {
+            return bad("surface", "larger than this tracker allows");
+        }
         self.params = params;
         self.restart();
         self.filled = filled;
@@ -137,9 +144,17 @@ impl SurfaceTracker {
         self.mesh.advance_versions_past(&replaced);
         self.faces = state.faces;
         (self.meshes, self.statistics) = (meshes, state.statistics);
-        self.intensities_at_surface =
-            (0..self.meshes.len()).map(|frame| self.measured_intensities(frame)).collect();
-        self.facts = (0..self.meshes.len()).map(|frame| self.measured_facts(frame)).collect();
+        self.intensities_at_surface = self
+            .meshes
+            .iter()
+            .enumerate()
+            .map(|(frame, mesh)| self.measured_intensities(frame, mesh))
+            .collect();
+        let measured = self.meshes.iter().zip(&self.intensities_at_surface).enumerate();
+        let facts = measured.map(|(frame, (mesh, intensities))| {
+            finished(self.measured_facts(frame, mesh, *intensities, &Pauses::default()))
+        });
+        self.facts = facts.collect();
         (self.cycle_closure_error, self.steps, self.lost) = (state.cycle_closure_error, state.steps, lost);
         self.frame_tracker = state.edge.map(|edge| FrameTracker::new(edge * self.region.space.scale));
         self.samples = self.newest_samples();

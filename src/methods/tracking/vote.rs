@@ -2,6 +2,7 @@
 //! by intensity, and votes for the faces between voxels of different clusters.
 
 use super::region::Region;
+use crate::methods::MethodError;
 use crate::pauses::Pauses;
 use serde::{Deserialize, Serialize};
 use wide::u8x16;
@@ -20,6 +21,13 @@ const VOXELS_PER_UNIT: usize = 8;
 
 /// Maximum number of Lloyd iterations that split a window into two clusters; two to five are usual.
 const ITERATIONS: usize = 50;
+
+/// Returns the error about a box with more boundaries than can be worked with.
+pub(super) fn too_much_boundary() -> MethodError {
+    let problem = "the objects in the box have more boundary than there is memory for here: use a smaller box, a higher \
+                   edge threshold, or an image with fewer voxels";
+    MethodError::TooLarge { problem: problem.into() }
+}
 
 /// The extent of the windows that vote for boundaries, and the criterion for their two clusters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -81,17 +89,28 @@ impl BoundaryVoting {
 
     /// Returns the faces between voxels of a frame that have boundary votes, within the processed box, and those in its
     /// sides where they cut bright regions.
-    pub async fn faces(&mut self, region: &Region, frame: usize, pauses: &Pauses) -> Faces {
+    ///
+    /// # Errors
+    /// [`MethodError::TooLarge`] if there are more than `most`.
+    pub async fn faces(
+        &mut self,
+        region: &Region,
+        frame: usize,
+        most: usize,
+        pauses: &Pauses,
+    ) -> Result<Faces, MethodError> {
         let mut faces = Faces::default();
         if region.is_blank(frame) {
-            return faces;
+            return Ok(faces);
         }
         let frames = self.window.frames_with_contrast(region, frame);
         for &t in &frames {
             self.ensure_levels(region, t, pauses).await;
         }
+        let mut room = most;
         for direction in [X, Y, Z] {
-            faces[direction] = self.votes(region, [frame; 2], direction, &frames, pauses).await;
+            faces[direction] = self.votes(region, [frame; 2], direction, &frames, room, pauses).await?;
+            room -= faces[direction].len();
         }
         let count = region.frames.len();
         let next = if frame + 1 < count { Some(frame + 1) } else { self.window.cyclic.then_some(0) };
@@ -100,10 +119,11 @@ impl BoundaryVoting {
             // Windows that contain both frames.
             let both: Vec<usize> =
                 self.window.frames_around(next, count).into_iter().filter(|t| frames.contains(t)).collect();
-            faces[TIME] = self.votes(region, [frame, next], TIME, &both, pauses).await;
+            faces[TIME] = self.votes(region, [frame, next], TIME, &both, room, pauses).await?;
         }
         region.clip_to_box(frame, &mut faces, pauses).await;
-        faces
+        faces.iter_mut().for_each(Vec::shrink_to_fit);
+        Ok(faces)
     }
 
     /// Returns the largest difference of the two cluster means in a window of any frame, whatever the threshold, in
@@ -175,14 +195,18 @@ impl BoundaryVoting {
     /// Returns the faces that have boundary votes between the voxels of `frame` and the next ones along a direction,
     /// which are in the frame `other`, another one for faces along time. The windows with centres in the frames `frames` are the
     /// ones that vote.
+    ///
+    /// # Errors
+    /// [`MethodError::TooLarge`] if there are more than `most`.
     async fn votes(
         &self,
         region: &Region,
         [frame, other]: [usize; 2],
         direction: usize,
         frames: &[usize],
+        most: usize,
         pauses: &Pauses,
-    ) -> Vec<Face> {
+    ) -> Result<Vec<Face>, MethodError> {
         let windows = VotingWindows {
             levels: frames.iter().filter_map(|&t| self.levels[t].as_deref()).collect(),
             rows: Rows::new(region.dims, self.window.half_width),
@@ -205,9 +229,12 @@ impl BoundaryVoting {
                     faces.push(Face { voxel: voxel as u32, weight });
                 }
             }
+            if faces.len() > most {
+                return Err(too_much_boundary());
+            }
             pauses.after(nx / VOXELS_PER_UNIT + 1).await;
         }
-        faces
+        Ok(faces)
     }
 }
 
@@ -565,7 +592,7 @@ mod tests {
                 .collect();
             let mut voted = 0;
             for t in 0..frames {
-                let faces = finished(voting.faces(&region, t, &Pauses::default()));
+                let faces = finished(voting.faces(&region, t, usize::MAX, &Pauses::default())).unwrap();
                 for direction in [X, Y, Z, TIME] {
                     let next = [1, nx, nx * ny, 0][direction];
                     for i in 0..count {
@@ -605,7 +632,7 @@ mod tests {
         let region = region([9, 9, 9], 2);
         let mut voting =
             BoundaryVoting::new(Window { half_width: 2, frames: 1, threshold: 100.0, cyclic: false }, 2);
-        let faces = finished(voting.faces(&region, 0, &Pauses::default()));
+        let faces = finished(voting.faces(&region, 0, usize::MAX, &Pauses::default())).unwrap();
         assert!(faces.iter().all(Vec::is_empty));
         for threshold in [100.0, 1e6] {
             voting.window.threshold = threshold;

@@ -6,7 +6,7 @@ use super::presence::inside_voxels;
 use super::region::Region;
 use super::{Cavity, SurfaceTracker};
 use crate::mesh::{TriangleMesh, measure};
-use crate::pauses::{Pauses, finished};
+use crate::pauses::Pauses;
 use crate::warning::{Place, Warning, WarningCode};
 
 /// Largest accepted difference between the middles of the intensity steps at the surface in two frames of the same windows,
@@ -126,35 +126,50 @@ impl SurfaceTracker {
         })
     }
 
-    /// Returns the facts about the surface of a frame tracked so far.
-    pub(super) fn measured_facts(&self, frame: usize) -> SurfaceFacts {
-        let mesh = &self.meshes[frame];
+    /// Returns the facts about the surface `mesh` of a frame, with the intensities at it.
+    pub(super) async fn measured_facts(
+        &self,
+        frame: usize,
+        mesh: &TriangleMesh,
+        intensities: Option<[f64; 2]>,
+        pauses: &Pauses,
+    ) -> SurfaceFacts {
         if mesh.triangles.is_empty() {
             return SurfaceFacts::default();
         }
         let measured = measure(mesh);
+        pauses.after(mesh.positions.len()).await;
         let genus = (2 * measured.components as i64 - measured.euler) / 2;
         let in_side = mesh.positions.iter().filter(|&&p| {
             let at = self.region.to_local(p * self.region.space.scale as f32);
             self.region.is_near_side(at, NEAR_SIDE)
         });
         let share = in_side.count() as f64 / mesh.positions.len() as f64;
-        let is_divided = self.parts_within(frame, mesh) > measured.components;
+        let parts = self.parts_within(frame, mesh, intensities, pauses).await;
+        let is_divided = parts > measured.components;
         SurfaceFacts { genus: genus.max(0) as u32, is_cut: share >= CUT, is_divided }
     }
 
     /// Returns the number of parts of the bright voxels within a surface of a frame.
-    fn parts_within(&self, frame: usize, mesh: &TriangleMesh) -> usize {
-        let Some([bright, dark]) = self.intensities_at_surface[frame] else { return 0 };
+    async fn parts_within(
+        &self,
+        frame: usize,
+        mesh: &TriangleMesh,
+        intensities: Option<[f64; 2]>,
+        pauses: &Pauses,
+    ) -> usize {
+        let Some([bright, dark]) = intensities else { return 0 };
         let (region, level) = (&self.region, dark + BRIGHT * (bright - dark));
         let mut mesh = mesh.clone();
         mesh.positions.iter_mut().for_each(|p| *p *= region.space.scale as f32);
         let inside = inside_voxels(region, &mesh);
+        pauses.now().await;
         let image = region.frames[frame].iter().enumerate();
         let mask: Vec<bool> =
             image.map(|(i, &value)| inside.contains(i) && f64::from(value) > level).collect();
         let lattice = Lattice { dims: region.dims, spacing: region.spacing.to_array() };
-        let (parts, count) = finished(lattice.parts(&mask, &Pauses::default()));
+        pauses.now().await;
+        let (parts, count) = lattice.parts(&mask, pauses).await;
         let mut sizes = vec![0usize; count + 1];
         parts.iter().filter(|part| **part > 0).for_each(|&part| sizes[part as usize] += 1);
         let all: usize = sizes.iter().sum();
@@ -214,9 +229,9 @@ impl SurfaceTracker {
         })
     }
 
-    /// Returns the mean intensities at the surface of a frame tracked so far, see [`intensities_at`].
-    pub(super) fn measured_intensities(&self, frame: usize) -> Option<[f64; 2]> {
-        let mut mesh = self.meshes[frame].clone();
+    /// Returns the mean intensities at the surface `mesh` of a frame, see [`intensities_at`].
+    pub(super) fn measured_intensities(&self, frame: usize, mesh: &TriangleMesh) -> Option<[f64; 2]> {
+        let mut mesh = mesh.clone();
         mesh.positions.iter_mut().for_each(|p| *p *= self.region.space.scale as f32);
         intensities_at(&self.region, frame, &mesh)
     }

@@ -3,7 +3,7 @@ import { SurfaceTracker, type Volume } from 'vesicle';
 import type { CineSpec } from './cine';
 import { errorOf } from './frames';
 import type { ComparedTrack, Setup, SurfaceError } from './protocol';
-import { prepareInSlices, trackerOptions } from './source';
+import { inWords, prepareInSlices, trackerOptions } from './source';
 
 type OnProgress = (part: number, phase: string) => void;
 
@@ -15,6 +15,7 @@ export async function trackForComparison(
   original: Volume,
   spec: CineSpec | undefined,
   setup: Setup,
+  isSmall: boolean,
   signal: AbortSignal,
   onProgress: OnProgress,
 ): Promise<ComparedTrack | undefined> {
@@ -22,13 +23,13 @@ export async function trackForComparison(
   try {
     const volume = await prepareInSlices(original, setup.preparation, (what) => onProgress(0, what), signal);
     try {
-      return await trackAll(volume, spec, setup, signal, onProgress, began);
+      return await trackAll(volume, spec, setup, isSmall, signal, onProgress, began);
     } finally {
       if (volume !== original) volume.free();
     }
   } catch (error) {
     if (signal.aborted) return undefined;
-    throw error;
+    throw inWords(error);
   }
 }
 
@@ -36,11 +37,12 @@ async function trackAll(
   volume: Volume,
   spec: CineSpec | undefined,
   setup: Setup,
+  isSmall: boolean,
   signal: AbortSignal,
   onProgress: OnProgress,
   began: number,
 ): Promise<ComparedTrack> {
-  const tracker = await SurfaceTracker.create({ volume, ...trackerOptions(volume, setup) }, { signal });
+  const tracker = await SurfaceTracker.create({ volume, ...trackerOptions(volume, setup, isSmall) }, { signal });
   try {
     const { threshold } = setup.params;
     if (threshold !== undefined) tracker.setParams({ threshold: threshold as number });

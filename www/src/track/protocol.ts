@@ -201,7 +201,14 @@ export interface Requests extends CodeRequests {
    * tracker stay in use.
    */
   open: {
-    body: { name: string; source: ImageSource; setup: Setup; saved?: SavedTrack | undefined };
+    body: {
+      name: string;
+      source: ImageSource;
+      setup: Setup;
+      saved?: SavedTrack | undefined;
+      /** Whether the image is in small files, or in a small session. */
+      isSmall: boolean;
+    };
     reply: OpenedImage;
   };
   /** Builds a new tracker of the same image. On failure, the previous one stays in use. */

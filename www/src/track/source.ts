@@ -1,7 +1,7 @@
 /** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
 
-import { SurfaceTracker, Volume } from 'vesicle';
-import { areSmall, SMALL } from '../small-files';
+import { SurfaceTracker, VesicleError, Volume } from 'vesicle';
+import { SMALL, TRACK_OF_SMALL } from '../small-files';
 import { text } from '../texts';
 import { invert } from '../view/anatomy';
 import { groupFiles } from '../worker/file-groups';
@@ -46,6 +46,12 @@ async function fromParts(parts: NamedBytes[][]): Promise<Volume> {
   }
 }
 
+/** Returns an error in words of the app: of an object that is too large for a tracker, what to do about it here. */
+export function inWords(error: unknown): unknown {
+  const isTooLarge = error instanceof VesicleError && error.code === 'too-large';
+  return isTooLarge ? new Refusal(error.code, text('track.tooLarge')) : error;
+}
+
 /** The most voxels that an image of small files may have, with slices between its own. */
 const MOST_OF_SMALL = 2 ** 26;
 /** The largest factor by which the library multiplies slices. */
@@ -53,11 +59,10 @@ const MOST_SLICES = 16;
 
 /** Throws a `Refusal` if small files would become an image that is too large for the memory of a page. */
 export function checkSmall(
-  source: ImageSource,
   { dims, frames, spacing }: Pick<Volume, 'dims' | 'frames' | 'spacing'>,
   preparation: Preparation,
 ): void {
-  if (!('files' in source) || !enriches(preparation) || !areSmall(source.files)) return;
+  if (!enriches(preparation)) return;
   const [finest, middle, thickest] = [...spacing].sort((a, b) => a - b) as [number, number, number];
   const factor =
     preparation.factor || Math.min(MOST_SLICES, Math.max(1, Math.round(thickest / ((finest + middle) / 2))));
@@ -128,8 +133,12 @@ export function factorsOf({ spacing }: Pick<Volume, 'spacing'>, binning: number)
   return [0, 1, 2].map((axis) => (axis === across ? 1 : binning)) as [number, number, number];
 }
 
-/** Returns the options of a tracker, without the edge threshold τ. */
-export function trackerOptions({ affine, dims }: Pick<Volume, 'affine' | 'dims'>, { box, at, cavity, params }: Setup) {
+/** Returns the options of a tracker, without the edge threshold τ; `isSmall` tells whether the image is in small files. */
+export function trackerOptions(
+  { affine, dims }: Pick<Volume, 'affine' | 'dims'>,
+  { box, at, cavity, params }: Setup,
+  isSmall = false,
+) {
   const { threshold: _, ...others } = params;
   const region = box && voxelsOf(box, invert(affine), dims);
   const voxels = region && { min: region.low, max: region.high };
@@ -138,6 +147,7 @@ export function trackerOptions({ affine, dims }: Pick<Volume, 'affine' | 'dims'>
     params: others,
     ...(voxels && { voxels }),
     ...(cavity === 'closed' && { cavity }),
+    ...(isSmall && TRACK_OF_SMALL),
   };
 }
 
@@ -149,6 +159,14 @@ export async function proposeFor(volume: Volume, query: ObjectQuery, signal: Abo
   return { box: boxOf({ low: voxels.min, high: voxels.max }, volume.affine), at, cavity, threshold };
 }
 
+function made(make: () => SurfaceTracker): SurfaceTracker {
+  try {
+    return make();
+  } catch (error) {
+    throw inWords(error);
+  }
+}
+
 /**
  * Builds a tracker of a prepared image; also returns the tracker's default for the edge threshold τ, which the setup
  * may override.
@@ -156,9 +174,10 @@ export async function proposeFor(volume: Volume, query: ObjectQuery, signal: Abo
 export function buildTracker(
   volume: Volume,
   setup: Setup,
+  isSmall: boolean,
   state?: Uint8Array,
 ): { tracker: SurfaceTracker; suggested: number } {
-  const tracker = new SurfaceTracker({ volume, ...trackerOptions(volume, setup) });
+  const tracker = made(() => new SurfaceTracker({ volume, ...trackerOptions(volume, setup, isSmall) }));
   try {
     const { threshold } = setup.params;
     const suggested = tracker.params.threshold;

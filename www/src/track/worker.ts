@@ -30,7 +30,7 @@ import type {
   VolumeView,
   WorkerEvent,
 } from './protocol';
-import { buildTracker, checkSmall, openImage, prepare, proposeFor } from './source';
+import { buildTracker, checkSmall, inWords, openImage, prepare, proposeFor } from './source';
 
 /**
  * Parameters that the boundary depends on. If only others change, the boundary found in all frames is kept, provided
@@ -51,6 +51,8 @@ interface LoadedImage {
   preparation: Preparation;
   /** How notes on the files change the display. */
   display: ReturnType<typeof displayOf>;
+  /** Whether the image is in small files, or in a small session. */
+  isSmall: boolean;
 }
 
 class Session {
@@ -95,7 +97,7 @@ class Session {
     data: () => ({ extension: 'nii', bytes: this.#image().original.toNifti() }),
   };
 
-  async #open({ name, source, setup, saved }: Requests['open']['body']): Promise<OpenedImage> {
+  async #open({ name, source, setup, saved, isSmall }: Requests['open']['body']): Promise<OpenedImage> {
     await this.#pause();
     const tell = (what: string) => send({ event: 'preparing', what });
     const began = performance.now();
@@ -103,15 +105,15 @@ class Session {
     const spec = 'cine' in source ? source.cine : undefined;
     let made: Volume = original;
     try {
-      checkSmall(source, original, setup.preparation);
+      if (isSmall) checkSmall(original, setup.preparation);
       made = prepare(original, setup.preparation, tell);
       const took = performance.now() - began;
-      const ready = this.#adopt(made, setup, saved);
+      const ready = this.#adopt(made, setup, isSmall, saved);
       const { dims, spacing } = original;
       this.#freeImage();
       const files = 'files' in source ? source.files.map(({ name, notes }) => ({ name, notes })) : [];
-      const { preparation } = setup;
-      this.#loaded = { name, files, original, spec, preparedVolume: made, preparation, display: displayOf(source) };
+      const [{ preparation }, display] = [setup, displayOf(source)];
+      this.#loaded = { name, files, original, spec, preparedVolume: made, preparation, display, isSmall };
       const truth = spec && Array.from({ length: spec.frames }, (_, frame) => trueVolume(spec, frame));
       const volume = this.#view();
       return withTransfer({ ...ready, volume, dims, spacing, truth, openingMs: took }, [volume.voxels]);
@@ -131,10 +133,11 @@ class Session {
   #build(setup: Setup): Ready {
     const loaded = this.#image();
     if (same(loaded.preparation, setup.preparation))
-      return { ...this.#adopt(loaded.preparedVolume, setup), volume: undefined };
+      return { ...this.#adopt(loaded.preparedVolume, setup, loaded.isSmall), volume: undefined };
+    if (loaded.isSmall) checkSmall(loaded.original, setup.preparation);
     const made = prepare(loaded.original, setup.preparation, (what) => send({ event: 'preparing', what }));
     try {
-      const ready = this.#adopt(made, setup);
+      const ready = this.#adopt(made, setup, loaded.isSmall);
       if (loaded.preparedVolume !== loaded.original) loaded.preparedVolume.free();
       this.#loaded = { ...loaded, preparedVolume: made, preparation: setup.preparation };
       const volume = this.#view();
@@ -145,8 +148,8 @@ class Session {
     }
   }
 
-  #adopt(volume: Volume, setup: Setup, saved?: SavedTrack): Omit<Ready, 'volume'> {
-    const { tracker, suggested } = buildTracker(volume, setup, saved?.state);
+  #adopt(volume: Volume, setup: Setup, isSmall: boolean, saved?: SavedTrack): Omit<Ready, 'volume'> {
+    const { tracker, suggested } = buildTracker(volume, setup, isSmall, saved?.state);
     this.#tracker?.free();
     this.#tracker = logged(tracker, this.#log, ['step', 'setParams']);
     this.#log.begin(setup);
@@ -217,7 +220,7 @@ class Session {
     try {
       await tracker.run({ signal, onStep: (report) => this.#stepped(report) });
     } catch (error) {
-      if (!signal.aborted) send({ event: 'failure', failure: toFailure(error) });
+      if (!signal.aborted) send({ event: 'failure', failure: toFailure(inWords(error)) });
     }
     this.#reportStopped();
   }
@@ -260,7 +263,7 @@ class Session {
     try {
       await tracker.run({ signal, maxIterations, onStep: (report) => this.#stepped(report) });
     } catch (error) {
-      if (!signal.aborted) throw error;
+      if (!signal.aborted) throw inWords(error);
     } finally {
       this.#reportStopped();
     }
@@ -292,7 +295,8 @@ class Session {
 
   #backToBoundary(params: ParamValues): void {
     if (!this.#boundaryState) {
-      this.#adopt(this.#image().preparedVolume, this.#setup as Setup);
+      const { preparedVolume, isSmall } = this.#image();
+      this.#adopt(preparedVolume, this.#setup as Setup, isSmall);
       return;
     }
     const tracker = this.#current();
@@ -351,9 +355,9 @@ class Session {
 
   async #compare(setup: Setup): Promise<ComparedTrack | undefined> {
     await this.#pause();
-    const { original, spec } = this.#image();
+    const { original, spec, isSmall } = this.#image();
     const tell = (part: number, phase: string) => send({ event: 'comparing', part, phase });
-    return this.#comparison.begin((signal) => trackForComparison(original, spec, setup, signal, tell));
+    return this.#comparison.begin((signal) => trackForComparison(original, spec, setup, isSmall, signal, tell));
   }
 }
 
