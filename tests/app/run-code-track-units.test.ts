@@ -23,7 +23,7 @@ const SETUP: Setup = { preparation: PLAIN, box: undefined, at: undefined, params
 async function interactiveRun(seed: number, source: ImageSource): Promise<Uint8Array> {
   const random = uniform(seed);
   const pick = pickFrom(random);
-  await worker.request('open', { name: 'cine', source, setup: SETUP });
+  await worker.request('open', { name: 'cine', source, setup: SETUP, isSmall: false });
   const saves: SavedTrack[] = [];
   const params = (): ParamValues =>
     pick([
@@ -80,7 +80,7 @@ test('the code of random runs gives the same surfaces, of a file', async () => {
 
 test('the code says that cavities are closed, and nothing of those that are open', async () => {
   const codeOf = async (cavity: Setup['cavity']) => {
-    await worker.request('open', { name: 'cine', source: { cine: CINE }, setup: { ...SETUP, cavity } });
+    await worker.request('open', { name: 'cine', source: { cine: CINE }, setup: { ...SETUP, cavity }, isSmall: false });
     return (await worker.request('code', { stem: 'cine', edits: [] })).code;
   };
   expect(await codeOf('closed')).toContain("cavity: 'closed'");

@@ -1,11 +1,18 @@
 /** Which files are small: they may come from anyone, and may not take long. */
 import type { NamedBytes } from './protocol';
+import type { Session } from './session/schema';
 
 /** Bytes of files that are small, all together. */
 export const SMALL = 2 ** 17;
 
 /** What a tracker of an image in small files may work with; with more, the page takes over a gigabyte. */
 export const TRACK_OF_SMALL = { maxVertices: 200_000, maxVoxels: 8_000_000 };
+
+/** Returns whether data are in small files, or in a small session, which has them. */
+export function isOfSmall(session: Session | undefined, files: readonly (Blob | NamedBytes)[] | undefined): boolean {
+  if (session?.isSmall && session.source.files.every(({ content }) => content)) return true;
+  return files !== undefined && areSmall(files);
+}
 
 /** Returns whether files are small, all together. */
 export function areSmall(files: readonly (Blob | NamedBytes)[]): boolean {

@@ -5,7 +5,7 @@ import type { ImageSource, LargeSource, Loaded, NamedBytes, ParamSpec, ParamValu
 import type { Session } from '../session/file';
 import { contentOf } from '../session/recognise';
 import type { ContentOf } from '../session/schema';
-import { areSmall } from '../small-files';
+import { isOfSmall } from '../small-files';
 import { text } from '../texts';
 import { nameOf, readFiles } from '../ui/files';
 import { count } from '../ui/format';
@@ -128,7 +128,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     const { saved, page } = moments?.now ?? {};
     const choice = page?.choice ?? (reopening ? this.#ui.start.inForce : this.#startFor(source, volume));
     const setup = reopening || page ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
-    const maxVertices = isSmall(source, volume) ? MOST_OF_SMALL : undefined;
+    const maxVertices = isOfSmall(source.session, storedIn(volume)) ? MOST_OF_SMALL : undefined;
     const body = { name: source.name, source: volume, setup, frame: frameOf(source), saved, maxVertices };
     const loaded = await this.#client.request('load', body, transferable(volume));
     return { ...loaded, choice: { ...choice, levels: loaded.levels }, setup, moments };
@@ -246,11 +246,10 @@ export function frameOf({ linked, session }: ExtractSource): number {
   return settings instanceof LinkError ? 0 : (settings?.frame ?? 0);
 }
 
-/** Returns whether an image is in small files, or in a small session. */
-function isSmall({ session }: ExtractSource, source: ImageSource): boolean {
-  if (session?.isSmall && session.source.files.every(({ content }) => content)) return true;
-  if ('files' in source) return areSmall(source.files);
-  return 'zarr' in source && source.zarr instanceof Blob && areSmall([source.zarr]);
+/** Returns the files that an image is in; undefined if it is computed, or has an address or a folder. */
+function storedIn(source: ImageSource): readonly (Blob | NamedBytes)[] | undefined {
+  if ('files' in source) return source.files;
+  return 'zarr' in source && source.zarr instanceof Blob ? [source.zarr] : undefined;
 }
 
 function transferable(source: ImageSource): Transferable[] {

@@ -1,7 +1,7 @@
 import { exampleUrl } from '../examples';
 import type { Moments } from '../session/moments';
 import { contentOf } from '../session/recognise';
-import { areSmall } from '../small-files';
+import { isOfSmall } from '../small-files';
 import type { TrackClient } from '../track/client';
 import { IMAGES, type TrackExample } from '../track/examples';
 import { imageById } from '../track/presets';
@@ -77,19 +77,13 @@ export class TrackOpening extends Opening<TrackExample, LinkedTrack, ImageSource
     const moments = session && (await import('./track-session')).unpackTrack(contentOf(session, 'track'));
     const saved = moments?.now.saved;
     const setup = saved?.setup ?? (reopening ? this.#present() : setupOf(example, linked));
-    const isSmall = isInSmall({ session }, source);
+    const isSmall = isOfSmall(session, 'files' in source ? source.files : undefined);
     return { ...(await this.#client.request('open', { name, source, setup, saved, isSmall })), setup, moments };
   }
 
   protected adopt(opened: OpenedTrack, source: TrackSource, reopening: boolean): Promise<void> {
     return this.#onOpened(opened, source, reopening);
   }
-}
-
-/** Returns whether an image is in small files, or in a small session. */
-function isInSmall({ session }: Pick<TrackSource, 'session'>, source: ImageSource): boolean {
-  if (session?.isSmall && session.source.files.every(({ content }) => content)) return true;
-  return 'files' in source && areSmall(source.files);
 }
 
 async function imageOf({ source }: TrackExample): Promise<ImageSource> {
