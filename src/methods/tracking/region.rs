@@ -90,7 +90,7 @@ impl Region {
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] for voxel axes that are not at right angles, a box outside the volume, too few
-    /// voxels, or no contrast; [`MethodError::TooLarge`] for too many; [`MethodError::Volume`] if a frame does not fit into memory.
+    /// voxels, too many, or no contrast; [`MethodError::Volume`] if a frame does not fit into memory.
     pub async fn new(volume: &Volume, bounds: Option<Bounds>, pauses: &Pauses) -> Result<Self, MethodError> {
         let spacing = DVec3::from(volume.spacing());
         let axes = volume.affine().matrix3;
@@ -340,10 +340,19 @@ fn lacks_value(volume: &Volume, index: usize) -> bool {
 fn check_size(dims: [usize; 3], frames: usize) -> Result<(), MethodError> {
     let voxels = dims.iter().fold(1u64, |product, &n| product.saturating_mul(n as u64));
     let bytes = voxels.saturating_mul(BYTES[0] + BYTES[1] * frames as u64);
-    if bytes <= MAX_BYTES { Ok(()) } else { Err(too_many_voxels(dims, frames)) }
+    if bytes <= MAX_BYTES {
+        return Ok(());
+    }
+    let problem = format!(
+        "{dims:?} voxels with padding in {frames} frames need {} MB, more than {}; use a smaller box, or an image with \
+         fewer voxels",
+        bytes / 1_000_000,
+        MAX_BYTES / 1_000_000
+    );
+    Err(MethodError::invalid("box", problem))
 }
 
-/// Returns the error about a box with more voxels, with padding, than can be worked with.
+/// Returns the error about a box with more voxels, with padding, than a tracker may work with.
 pub(super) fn too_many_voxels([x, y, z]: [usize; 3], frames: usize) -> MethodError {
     let problem = format!(
         "the box has {x} × {y} × {z} voxels, with two more on every side, in {frames} frames, more than there is memory for \
