@@ -33,7 +33,7 @@ pub enum MethodError {
     /// There is more to work with than memory is given for.
     #[error("{problem}")]
     TooLarge {
-        /// What there is too much of, and how to avoid it.
+        /// The limit that would be exceeded, and how to stay below it.
         problem: String,
     },
     /// A linear system, that of the implicit surface's constraints, could not be solved to the requested tolerance.

@@ -5,7 +5,7 @@ import type { Session } from './session/schema';
 /** Bytes of files that are small, all together. */
 export const SMALL = 2 ** 17;
 
-/** What a tracker of an image in small files may work with; with more, the page takes over a gigabyte. */
+/** Limits of a tracker of an image in small files; with more, the page takes over a gigabyte. */
 export const TRACK_OF_SMALL = { maxVertices: 200_000, maxVoxels: 8_000_000 };
 
 /** Returns whether data are in small files, or in a small session, which has them. */
