@@ -77,7 +77,6 @@ pub fn deformable(data: &[u8]) {
         start: start(bytes, &volume),
         levels: bytes.below(3),
         edge: bytes.chance(2).then(|| bytes.within(0.8, 4.0)),
-        max_vertices: None,
         params: Some(deformable_params(bytes, &volume)),
         max_vertices: bytes.chance(4).then(|| 20 + bytes.below(1000)),
     };

@@ -223,12 +223,12 @@ impl Volume {
     /// # Errors
     /// As [`Self::grid_in`].
     pub(crate) fn frame_grid(&self, range: [f64; 2], frame: usize) -> Result<FrameGrid, VolumeError> {
-        if self.dims().iter().product::<usize>() > COPIED {
-            if let Some(shared) = self.shared_voxels(range, frame)? {
-                return Ok(FrameGrid::Shared(shared));
-            }
-        }
-        self.grid_in(range, frame).map(FrameGrid::from)
+        let are_many = self.dims().iter().product::<usize>() > COPIED;
+        let shared = if are_many { self.shared_voxels(range, frame)? } else { None };
+        shared.map_or_else(
+            || self.grid_in(range, frame).map(FrameGrid::from),
+            |shared| Ok(FrameGrid::Shared(shared)),
+        )
     }
 
     /// Returns the voxels of one frame, to be shared; `None` if some may not be finite.

@@ -161,7 +161,7 @@ impl Volume {
     /// Creates a volume after validating all fields of `init`.
     ///
     /// # Errors
-    /// [`VolumeError::InvalidArgument`] when a dimension is 0, the number of voxels is not the product of the
+    /// [`VolumeError::InvalidArgument`] when a dimension is 0 or above 16,777,216, the number of voxels is not the product of the
     /// dimensions, the affine is not finite, not invertible, has a voxel axis whose length in world units is not within
     /// 1e-12 to 1e12, or maps a corner beyond the range of `f32`, the slope is 0 or not finite, the intercept is not
     /// finite, the frame time is negative or not finite, no voxel is a finite number, or an intensity exceeds the range
@@ -458,9 +458,16 @@ fn converted(
     Ok(out)
 }
 
+/// The largest number of voxels along an axis: with more, not every voxel index is a number in single precision.
+const LONGEST_SIDE: usize = 1 << 24;
+
 fn check_dims(dims: [usize; 4], len: usize) -> Result<(), VolumeError> {
     if dims.contains(&0) {
         return Err(VolumeError::invalid("dims", format!("must all be at least 1, got {dims:?}")));
+    }
+    if dims[..3].iter().any(|&n| n > LONGEST_SIDE) {
+        let problem = format!("must be at most {LONGEST_SIDE} along an axis, got {dims:?}");
+        return Err(VolumeError::invalid("dims", problem));
     }
     let count = dims.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
     if count == Some(len) {

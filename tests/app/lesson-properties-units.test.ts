@@ -114,6 +114,8 @@ test('what would keep the page busy is refused', () => {
   const row = `${'|a'.repeat(20)}|\n`;
   const table = `# T\n\n## S\n${row}${'|-'.repeat(20)}|\n${row.repeat(2_000)}`;
   expect(() => whole(table)).toThrow('at most 5000 cells of tables');
+  for (const many of ['x\n\n', '- x\n', '`x` ', '[x](https://x.org) ', '*x* '])
+    expect(() => whole(`# T\n\n## S\n${many.repeat(6_000)}`)).toThrow('at most 5000 paragraphs');
   expect(() => whole(`# T\n\n## S\n$$${'x'.repeat(2000)}$$`)).toThrow('characters in a formula');
   expect(() => whole('# T\n\n## S\n'.padEnd(250_000))).toThrow('at most 200000 characters');
   const ids = Array.from({ length: 101 }, (_, k) => ({ id: `s${k}` }));

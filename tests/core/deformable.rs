@@ -643,6 +643,16 @@ fn a_state_with_another_edge_length_continues() {
 }
 
 #[test]
+fn a_volume_too_long_for_single_precision_is_refused_at_once() {
+    for dims in [[200_000, 1, 1], [1, 1, 200_000], [2, 140_000, 2]] {
+        let values = Voxels::U8((0..dims.iter().product::<usize>()).map(|k| (k / 7 % 2) as u8).collect());
+        let volume = Volume::new(VolumeInit::new(values, [dims[0], dims[1], dims[2], 1])).unwrap();
+        let refusal = DeformableModel::new(&volume, DeformableOptions::default()).unwrap_err();
+        assert!(matches!(refusal, MethodError::InvalidArgument { parameter: "volume", .. }), "{refusal}");
+    }
+}
+
+#[test]
 fn a_volume_whose_mesh_exceeds_memory_is_refused_at_once() {
     let volume = scenes::volume([20_000, 1, 1], |p| p.x);
     let refusal = DeformableModel::new(&volume, enclosing()).unwrap_err();

@@ -35,7 +35,7 @@ import { Refusal, toFailure } from './worker/refusal';
 import { logged, RunRecorder } from './worker/run-log';
 import { buffersOf, type Handlers, sender, serve, Work, withTransfer } from './worker/serving';
 import { copySurface, emptyArrays, sectionOf, transferOf } from './worker/surface-buffers';
-import { displayOf, levelsOf, openFrame, viewOf } from './worker/volumes';
+import { checkPlanes, displayOf, levelsOf, openFrame, viewOf } from './worker/volumes';
 
 /**
  * Number of sets of surface buffers that go back and forth between worker and page: one on the screen, one in transit
@@ -136,6 +136,7 @@ class Session {
     if ('zarr' in source) return this.#loadLarge(source, body, signal);
     const { volume, frames, unit, voxels } = await openFrame(source, frame);
     try {
+      if (maxVertices !== undefined) checkPlanes(volume);
       const view: VolumeView = { ...viewOf(volume, name, voxels), ...displayOf(source), frames, ...(unit && { unit }) };
       const fitting = fittingSetup(setup, volume);
       const model = saved ? restoredModel(volume, saved, maxVertices) : buildModel(volume, fitting, maxVertices);
@@ -166,6 +167,7 @@ class Session {
     const large = await LargeVolume.open(source, signal);
     try {
       const view = large.view(name);
+      if (maxVertices !== undefined) checkPlanes(view);
       const fitting = { ...setup, levels: Math.min(setup.levels, large.coarserLevels) };
       const ready = this.#replaceModel(large.model(fitting, maxVertices), fitting, 'measured');
       this.#keep({ large, maxVertices });

@@ -161,6 +161,9 @@ const DELTA_OF_THIN: f64 = 0.5;
 /// [`Domain::longest_delta`].
 const DELTA_RANGE: RangeInclusive<f64> = 0.2..=20.0;
 
+/// The largest number of voxels along an axis: with more, positions in single precision are a hundredth of a voxel apart.
+const LONGEST_SIDE: usize = 1 << 17;
+
 /// The largest absolute strength of an attractor; beyond it, forces overflow.
 const MAX_STRENGTH: f64 = 1e3;
 /// The largest radius and absolute coordinate of an attractor, in voxels of the volume; beyond it, forces overflow.
@@ -302,6 +305,12 @@ impl DeformableModel {
         volume: &Volume,
         options: DeformableOptions,
     ) -> Result<impl Future<Output = Result<Self, MethodError>> + use<>, MethodError> {
+        let longest = volume.dims().into_iter().fold(0, usize::max);
+        if longest > LONGEST_SIDE {
+            let problem =
+                format!("has {longest} voxels along an axis; at most {LONGEST_SIDE} can be fitted: crop it");
+            return Err(MethodError::invalid("volume", problem));
+        }
         let params = options.params.unwrap_or_else(|| DeformableParams::for_volume(volume));
         params.validate()?;
         let DeformableOptions { frame, start, levels, edge, max_vertices, .. } = options;

@@ -715,7 +715,7 @@ fn dust(side: usize) -> Volume {
 #[test]
 fn creation_pauses_in_each_of_its_parts() {
     let volume = dust(40);
-    let mut creation = Box::pin(LabelSurfaces::begin(&volume, None, LabelParams::default()).unwrap());
+    let mut creation = Box::pin(LabelSurfaces::begin(&volume, None, LabelParams::default(), None).unwrap());
     let mut pauses = 0;
     while advance(&mut creation).is_pending() {
         pauses += 1;
@@ -735,7 +735,7 @@ fn surfaces_everywhere_in_a_large_volume_are_refused() {
 fn surfaces_made_in_slices_are_the_same() {
     let volume = noise([12, 11, 10], 3, 5);
     let mut whole = LabelSurfaces::new(&volume, None, LabelParams::default()).unwrap();
-    let mut creation = Box::pin(LabelSurfaces::begin(&volume, None, LabelParams::default()).unwrap());
+    let mut creation = Box::pin(LabelSurfaces::begin(&volume, None, LabelParams::default(), None).unwrap());
     let (mut slices, mut created) = (1, None);
     while created.is_none() {
         match advance(&mut creation) {

@@ -24,6 +24,9 @@ const CELL_END = /&|\\\\|\\(?:cr|newline|tabularnewline)\b/g;
 /** Most cells of tables, as bars between them: laying out 46,000 takes ten seconds. */
 const MOST_CELLS = 5_000;
 
+/** Most elements of all texts, such as paragraphs, links and entries of lists: laying out 47,000 takes three seconds. */
+const MOST_ELEMENTS = 5_000;
+
 /** Formulas that define commands: a line of them can stand for megabytes. */
 const DEFINITION = /\\(?:[egx]?def|(?:future)?let|(?:re|provide)?newcommand|providecommand|renewcommand|global|long)\b/;
 
@@ -60,6 +63,11 @@ export function checkFormulas(file: string, formulas: string[]): void {
   if (formulas.length > MOST_FORMULAS) throw tooMuch(file, text('lessons.formulas'), MOST_FORMULAS);
   if (length > MOST_OF_FORMULAS) throw tooMuch(file, text('lessons.formulasCharacters'), MOST_OF_FORMULAS);
   if (cells > MOST_FORMULA_CELLS) throw tooMuch(file, text('lessons.formulaCells'), MOST_FORMULA_CELLS);
+}
+
+/** Throws an Error if the texts have too many elements. */
+export function checkElements(file: string, elements: number): void {
+  if (elements > MOST_ELEMENTS) throw tooMuch(file, text('lessons.elements'), MOST_ELEMENTS);
 }
 
 /** Returns whether a formula is typeset; others are shown as their source. */

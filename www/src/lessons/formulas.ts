@@ -1,5 +1,5 @@
 /** Markdown of lessons, as far as it is parsed: with formulas between dollar signs. Raw HTML is shown as text. */
-import MarkdownIt from 'markdown-it';
+import MarkdownIt, { type Token } from 'markdown-it';
 import { FORMULA } from './bounds';
 
 const FORMULA_HERE = new RegExp(FORMULA, 'y');
@@ -18,8 +18,17 @@ markdown.inline.ruler.before('escape', 'formula', (state, silent) => {
   return true;
 });
 
-/** Returns the formulas in a text, those that are typeset: dollar signs in code, for example, are no formulas. */
-export function formulasIn(source: string): string[] {
-  const tokens = markdown.parse(source, {}).flatMap(({ children }) => children ?? []);
-  return tokens.filter(({ type }) => type === 'formula').map(({ content }) => content);
+/**
+ * Returns the formulas in a text, those that are typeset, and its number of elements. Dollar signs in code, for example,
+ * are no formulas.
+ */
+export function partsOf(source: string): { formulas: string[]; elements: number } {
+  const blocks = markdown.parse(source, {});
+  const inline = blocks.flatMap(({ children }) => children ?? []);
+  const formulas = inline.filter(({ type }) => type === 'formula').map(({ content }) => content);
+  return { formulas, elements: [...blocks, ...inline].filter(isElement).length };
 }
+
+/** Whether a token is an element, not its end, its text or what is in it. */
+const isElement = ({ nesting, tag, hidden, type }: Token): boolean =>
+  nesting >= 0 && tag !== '' && !hidden && type !== 'softbreak';

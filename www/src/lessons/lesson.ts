@@ -1,9 +1,9 @@
 /** A lesson: `lesson.json` and its text in Markdown, as docs/lessons.md describes them to authors. */
 import { labOf } from '../labs/address';
 import { text } from '../texts';
-import { checkData, checkFormulas, checkSteps, checkText } from './bounds';
+import { checkData, checkElements, checkFormulas, checkSteps, checkText } from './bounds';
 import { type Check, checkProblem, type Operand, operandProblem } from './check';
-import { formulasIn } from './formulas';
+import { partsOf } from './formulas';
 import { unitNamed } from './units';
 
 /** Headings within a step, in the order in which they are shown; `answer` is for teachers only. */
@@ -59,7 +59,15 @@ export function parseLesson(files: LessonFiles, language: string): Lesson {
   checkText(textFile(used), source);
   const { title, intro, steps } = parseText(source);
   const texts = [intro, ...steps.flatMap(({ parts }) => Object.values(parts))];
-  checkFormulas(textFile(used), texts.flatMap(formulasIn));
+  const parts = texts.map(partsOf);
+  checkElements(
+    textFile(used),
+    parts.reduce((sum, { elements }) => sum + elements, 0),
+  );
+  checkFormulas(
+    textFile(used),
+    parts.flatMap(({ formulas }) => formulas),
+  );
   if (steps.length !== data.steps.length)
     throw new Error(
       text('lessons.stepsDiffer', { file: textFile(used), headings: steps.length, steps: data.steps.length }),

@@ -2,6 +2,11 @@
 declare module 'markdown-it' {
   interface Token {
     type: string;
+    tag: string;
+    /** 1 for a beginning, −1 for an end, 0 for what has none. */
+    nesting: number;
+    /** Whether it is not rendered, as paragraphs in lists without empty lines. */
+    hidden: boolean;
     children: Token[] | null;
     content: string;
     block: boolean;

@@ -9,7 +9,7 @@ import { Refusal } from '../worker/refusal';
 import { type Handlers, serve, withTransfer } from '../worker/serving';
 import { capacityFor } from '../worker/surface-buffers';
 import { triangleArea } from '../worker/triangle-area';
-import { displayOf, fitsNifti, viewOf } from '../worker/volumes';
+import { checkPlanes, displayOf, fitsNifti, viewOf } from '../worker/volumes';
 import type {
   LabelArray,
   LabelBlock,
@@ -27,7 +27,7 @@ import { withLabels } from './slicer';
 import { mapLike, type OpenMap, type OpenVolume, openImage, openLabels } from './source';
 
 /** Most vertices of the surfaces of labels in small files, and in small sessions: with more, the page takes over a gigabyte. */
-const MOST_OF_SMALL = 1_000_000;
+const MOST_OF_SMALL = 500_000;
 
 let maps = 0;
 
@@ -147,6 +147,7 @@ class Session {
     const opened = await openImage(source);
     try {
       const known = { isSmall: !labels && areSmall(source.files), ...session };
+      if (known.isSmall) checkPlanes(opened.volume);
       const live = new LiveMap(opened, labels ?? opened.map.voxels, opened.map.warnings, params, known);
       this.#adopt(live);
       this.#open?.volume.free();

@@ -8,7 +8,7 @@ import { Refusal, toFailure } from '../worker/refusal';
 import { logged, type RunLog, RunRecorder } from '../worker/run-log';
 import { type Handlers, sender, serve, Work, withTransfer } from '../worker/serving';
 import { transferOf } from '../worker/surface-buffers';
-import { displayOf, intensitiesOf, viewOf } from '../worker/volumes';
+import { checkPlanes, displayOf, intensitiesOf, viewOf } from '../worker/volumes';
 import { type CineSpec, trueVolume } from './cine';
 import { programOf } from './code';
 import { trackForComparison } from './comparing';
@@ -105,7 +105,10 @@ class Session {
     const spec = 'cine' in source ? source.cine : undefined;
     let made: Volume = original;
     try {
-      if (isSmall) checkSmall(original, setup.preparation);
+      if (isSmall) {
+        checkPlanes(original);
+        checkSmall(original, setup.preparation);
+      }
       made = prepare(original, setup.preparation, tell);
       const took = performance.now() - began;
       const ready = this.#adopt(made, setup, isSmall, saved);

@@ -3,6 +3,7 @@ import { type LengthUnit, VesicleError, Volume, type VolumeInit } from 'vesicle'
 import startReaders, { parseVolume } from 'vesicle/import';
 import type { FileNotes, Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
 import { shapeVoxels } from '../shapes';
+import { SMALL } from '../small-files';
 import { text } from '../texts';
 import { quantiles } from '../threshold';
 import { concerning, type Warning } from '../warnings';
@@ -66,6 +67,25 @@ export interface OpenFrame {
   unit: LengthUnit | undefined;
   /** The voxels as they were read, where these are the intensities that the page displays. */
   voxels: Intensities | undefined;
+}
+
+/** Most pixels of a plane through an image in small files: views of larger ones hold the page for seconds. */
+const MOST_PIXELS_OF_SMALL = 2 ** 22;
+
+/** Throws a `Refusal` if planes through an image in small files have too many pixels to be shown. */
+export function checkPlanes({ dims }: Pick<Volume, 'dims'>): void {
+  const [, middle = 1, longest = 1] = [...dims].sort((a, b) => a - b);
+  const pixels = middle * longest;
+  if (pixels <= MOST_PIXELS_OF_SMALL) return;
+  const millions = (count: number) => Math.round(count / 1e6);
+  throw new Refusal(
+    'too-large',
+    text('files.planesTooLarge', {
+      millions: millions(pixels),
+      kilobytes: SMALL / 2 ** 10,
+      most: millions(MOST_PIXELS_OF_SMALL),
+    }),
+  );
 }
 
 /**
