@@ -60,13 +60,13 @@ export function parseLesson(files: LessonFiles, language: string): Lesson {
   const { title, intro, steps } = parseText(source);
   const texts = [intro, ...steps.flatMap(({ parts }) => Object.values(parts))];
   const parts = texts.map(partsOf);
-  checkElements(
-    textFile(used),
-    parts.reduce((sum, { elements }) => sum + elements, 0),
-  );
   checkFormulas(
     textFile(used),
     parts.flatMap(({ formulas }) => formulas),
+  );
+  checkElements(
+    textFile(used),
+    parts.reduce((sum, { elements }) => sum + elements, 0),
   );
   if (steps.length !== data.steps.length)
     throw new Error(

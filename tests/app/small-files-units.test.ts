@@ -1,0 +1,30 @@
+// Bounds of data in small files, which may come from anyone.
+import { expect, test } from 'vitest';
+import type { Session } from '../../www/src/session/schema';
+import { isOfSmall, SMALL } from '../../www/src/small-files';
+import { checkPlanes } from '../../www/src/worker/volumes';
+
+type Dims = [number, number, number];
+
+const file = (size: number) => ({ name: 'x.nii', bytes: new Uint8Array(size) });
+
+test('data are small if their files are, all together, or the session that has them', () => {
+  expect(isOfSmall(undefined, [file(SMALL)])).toBe(true);
+  expect(isOfSmall(undefined, [file(SMALL), file(1)])).toBe(false);
+  expect(isOfSmall(undefined, [new Blob([new Uint8Array(SMALL + 1)])])).toBe(false);
+  expect(isOfSmall(undefined, undefined)).toBe(false);
+  const session = (content: Uint8Array | undefined, isSmall: boolean) =>
+    ({ isSmall, source: { name: 'x', files: [{ name: 'x.nii', sha256: '', content }] } }) as unknown as Session;
+  const large = [file(2 * SMALL)];
+  expect(isOfSmall(session(new Uint8Array(1), true), large)).toBe(true);
+  // The user's own files, whatever the session is.
+  expect(isOfSmall(session(undefined, true), large)).toBe(false);
+  expect(isOfSmall(session(new Uint8Array(1), false), large)).toBe(false);
+});
+
+test('planes through an image in small files have at most four million pixels', () => {
+  const message = 'have 88 million pixels; those of images in files of at most 128 KiB may have 4 million';
+  const [flat, upright, across] = [[9400, 9400, 1] as Dims, [1, 9400, 9400] as Dims, [9400, 1, 9400] as Dims];
+  for (const dims of [flat, upright, across]) expect(() => checkPlanes({ dims })).toThrow(message);
+  for (const dims of [[2048, 2048, 23] as Dims, [100_000, 30, 30] as Dims]) checkPlanes({ dims });
+});
