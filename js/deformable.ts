@@ -29,14 +29,9 @@ import {
   type Stepper,
   type StepReport,
 } from './stepper.js';
-import {
-  RawDeformable,
-  RawDeformableCreation,
-  RawDeformableOptions,
-  RawSparseOptions,
-  RawStart,
-  type RawVolume,
-} from './vesicle.js';
+// The module of one method lacks volumes larger than memory.
+import * as glue from './vesicle.js';
+import { RawDeformable, RawDeformableCreation, RawDeformableOptions, RawStart, type RawVolume } from './vesicle.js';
 import { checkedRegion, type Volume, volumeHandle } from './volume.js';
 import { ModelWarnings } from './warnings.js';
 
@@ -598,7 +593,7 @@ function onSparse<T>(
   const [corners, outside] = box ? checkedBox(box) : [];
   return () =>
     volume.use((raw) => {
-      const of = new RawSparseOptions(raw, rawStart(start), params);
+      const of = new glue.RawSparseOptions(raw, rawStart(start), params);
       of.setLevels(finest, outside, corners);
       of.setSize(edge, maxVertices);
       return make(raw, of);

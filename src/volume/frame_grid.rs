@@ -318,11 +318,13 @@ mod tests {
 
     #[test]
     fn few_voxels_are_copied_and_many_shared() {
-        let volume = |n: usize| {
-            Volume::new(VolumeInit::new(Voxels::U8((0..n).map(|k| k as u8).collect()), [n, 1, 1, 1])).unwrap()
+        const SIDE: usize = 1 << 12;
+        let volume = |rows: usize| {
+            let values = (0..SIDE * rows).map(|k| k as u8).collect();
+            Volume::new(VolumeInit::new(Voxels::U8(values), [SIDE, rows, 1, 1])).unwrap()
         };
-        let few = volume(COPIED).frame_grid([0.0, 255.0], 0).unwrap();
-        let many = volume(COPIED + 1).frame_grid([0.0, 255.0], 0).unwrap();
+        let few = volume(COPIED / SIDE).frame_grid([0.0, 255.0], 0).unwrap();
+        let many = volume(COPIED / SIDE + 1).frame_grid([0.0, 255.0], 0).unwrap();
         assert!(matches!((&few, &many), (FrameGrid::Stored(_), FrameGrid::Shared(_))));
         assert_eq!(few.values(COPIED - 300..COPIED), many.values(COPIED - 300..COPIED));
     }

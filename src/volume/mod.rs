@@ -654,7 +654,8 @@ mod tests {
         };
         assert_eq!(refused(VolumeInit { dims: [2, 2, 3, 1], ..good() }), "data");
         assert_eq!(refused(VolumeInit { dims: [2, 0, 2, 1], ..good() }), "dims");
-        assert_eq!(refused(VolumeInit { dims: [usize::MAX, 2, 2, 1], ..good() }), "data");
+        assert_eq!(refused(VolumeInit { dims: [usize::MAX, 2, 2, 1], ..good() }), "dims");
+        assert_eq!(refused(VolumeInit { dims: [2, 2, 2, usize::MAX], ..good() }), "data");
         assert_eq!(refused(VolumeInit { slope: 0.0, ..good() }), "slope");
         assert_eq!(refused(VolumeInit { slope: f64::NAN, ..good() }), "slope");
         assert_eq!(refused(VolumeInit { intercept: f64::INFINITY, ..good() }), "intercept");

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 const ALLOWED: [(&str, &[&str]); 10] = [
     ("warning", &[]),
     ("pauses", &[]),
-    ("math", &[]),
+    ("math", &["pauses"]),
     ("mesh", &["math", "pauses"]),
     ("spatial", &["math", "mesh", "pauses"]),
     ("volume", &["math", "mesh", "pauses", "warning"]),
