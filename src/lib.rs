@@ -3,7 +3,7 @@
 //!
 //! Modules form one-way layers, enforced by `tests/core/architecture.rs`: `math < mesh < {spatial, volume} < remesh <
 //! methods < bindings`; `io` uses only math, mesh and volume, `voxelise` also spatial. All may use `warning`, and
-//! `spatial`, `remesh` and `methods` `pauses`.
+//! all but `io` `pauses`.
 //!
 //! The JavaScript bindings are a crate of their own, `src/bindings`, with a Cargo feature for each method, so that a
 //! WebAssembly module can have one of them.
