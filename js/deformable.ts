@@ -16,7 +16,7 @@ import { NeedsDataError } from './error.js';
 import { Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { frameOf } from './mesh-file.js';
 import { Handle } from './runtime.js';
-import { isOfSmall, isSmall, MOST_VERTICES_OF_SMALL } from './small-files.js';
+import { isOfSmall, isSmall, limitOf, MOST_VERTICES_OF_SMALL } from './small-files.js';
 import { type SparseBox, type SparseSource, sparseSource, supply } from './sparse.js';
 import {
   checkedSlices,
@@ -554,9 +554,6 @@ class Created {
   ) {}
 }
 
-/** Returns the most vertices of a surface in a volume by default, undefined for those of the core. */
-const mostOf = (ofSmall: boolean) => (ofSmall ? MOST_VERTICES_OF_SMALL : undefined);
-
 /** Returns a function that makes what needs the arguments of a model of a volume in memory. */
 function dense<T>(
   volume: Handle<RawVolume>,
@@ -565,7 +562,7 @@ function dense<T>(
 ): () => T {
   const params = shallowCopy('params', options.params ?? {});
   const { frame = 0, start = 'contour', levels = 0, edge } = options;
-  const maxVertices = options.maxVertices ?? mostOf(isOfSmall(options.volume));
+  const maxVertices = limitOf(options.maxVertices, isOfSmall(options.volume), MOST_VERTICES_OF_SMALL);
   for (const name of ['finest', 'box'] as const) {
     if (options[name] !== undefined) throw invalid(name, 'only for volumes larger than memory');
   }
@@ -586,7 +583,7 @@ function onSparse<T>(
 ): () => T {
   const params = shallowCopy('params', options.params ?? {});
   const { start = 'contour', finest = 0, edge, box } = options;
-  const maxVertices = options.maxVertices ?? mostOf(isSmall(source.stored()));
+  const maxVertices = limitOf(options.maxVertices, isSmall(source.stored()), MOST_VERTICES_OF_SMALL);
   for (const name of ['frame', 'levels'] as const) {
     if (options[name] !== undefined) throw invalid(name, 'not for volumes larger than memory');
   }

@@ -3,7 +3,7 @@ import type { Vec3 } from './data.js';
 import { type Mesh, wrapMesh } from './mesh.js';
 import { frameOf, type MeshFrame } from './mesh-file.js';
 import { Handle } from './runtime.js';
-import { isOfSmall, MOST_LABEL_VERTICES_OF_SMALL } from './small-files.js';
+import { isOfSmall, limitOf, MOST_LABEL_VERTICES_OF_SMALL } from './small-files.js';
 import {
   checkedSlices,
   Runner,
@@ -66,7 +66,7 @@ function checked(given: LabelOptions) {
   if (maxVertices !== undefined) integer('maxVertices', maxVertices, { min: 1 });
   const image = volumeHandle('volume', volume);
   const wanted = labels && Float64Array.from(denseCopy('labels', labels), (label) => number('labels', label));
-  const most = maxVertices ?? (isOfSmall(volume) ? MOST_LABEL_VERTICES_OF_SMALL : undefined);
+  const most = limitOf(maxVertices, isOfSmall(volume), MOST_LABEL_VERTICES_OF_SMALL);
   return { volume, image, wanted, params, most };
 }
 

@@ -35,7 +35,7 @@ import {
   stated,
 } from './mesh-file.js';
 import { call, Handle } from './runtime.js';
-import { isOfSmall, MOST_TRIANGLES_OF_SMALL } from './small-files.js';
+import { isOfSmall, limitOf, MOST_TRIANGLES_OF_SMALL } from './small-files.js';
 import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
 // Entry points without readers of files lack `RawMeshFile`, which an import by name would demand.
@@ -357,7 +357,7 @@ export class Mesh {
     number('iso', iso);
     integer('frame', frame);
     if (maxTriangles !== undefined) integer('maxTriangles', maxTriangles, { min: 1 });
-    const most = maxTriangles ?? (isOfSmall(volume) ? MOST_TRIANGLES_OF_SMALL : undefined);
+    const most = limitOf(maxTriangles, isOfSmall(volume), MOST_TRIANGLES_OF_SMALL);
     const handle = volumeHandle('volume', volume);
     return handle.use((raw) =>
       made(() => RawMesh.marchingCubes(raw, iso, frame, most), {

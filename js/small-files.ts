@@ -69,6 +69,11 @@ export function noted<T extends object>(unpacked: T, stored: number): T {
 /** Returns whether voxels, or a volume, come from small files, as {@link noted}. */
 export const isOfSmall = (unpacked: unknown): boolean => OF_SMALL in Object(unpacked);
 
+/** Returns the limit that a caller gives, else `most` for what is small; undefined for the limit of the core. */
+export function limitOf(given: number | undefined, small: boolean, most: number): number | undefined {
+  return given ?? (small ? most : undefined);
+}
+
 /** Notes that what is made of voxels, or of a volume, comes from small files if they do; returns it. */
 export function notedLike<T extends object>(unpacked: unknown, made: T): T {
   return isOfSmall(unpacked) ? noted(made, 0) : made;

@@ -3,7 +3,7 @@ import type { SpaceOptions, Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { checkedSpaceOptions, frameOf, type MeshFrame, SPACE_OPTIONS } from './mesh-file.js';
 import { Handle } from './runtime.js';
-import { isOfSmall, MOST_TRACKED_OF_SMALL, MOST_VOXELS_OF_SMALL } from './small-files.js';
+import { isOfSmall, limitOf, MOST_TRACKED_OF_SMALL, MOST_VOXELS_OF_SMALL } from './small-files.js';
 import {
   checkedSlices,
   Runner,
@@ -528,8 +528,8 @@ function beginning<T>(options: TrackingOptions, make: (of: RawTrackingOptions) =
   const params = shallowCopy('params', options.params ?? {});
   const isClosed = isClosedCavity(options.cavity);
   const ofSmall = isOfSmall(options.volume);
-  const maxVertices = options.maxVertices ?? (ofSmall ? MOST_TRACKED_OF_SMALL : undefined);
-  const maxVoxels = options.maxVoxels ?? (ofSmall ? MOST_VOXELS_OF_SMALL : undefined);
+  const maxVertices = limitOf(options.maxVertices, ofSmall, MOST_TRACKED_OF_SMALL);
+  const maxVoxels = limitOf(options.maxVoxels, ofSmall, MOST_VOXELS_OF_SMALL);
   return () =>
     image.use((raw) => {
       const of = new RawTrackingOptions(raw, box, voxels, nearest, triangles(options.start), isClosed, params);

@@ -16,7 +16,7 @@ import {
 import type { LengthUnit, Space, Vec3, VolumeFileOptions, VolumeInit, VoxelArray } from './data.js';
 import { Handle } from './runtime.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
-import { isOfSmall, MOST_ENRICHED_OF_SMALL, noted, notedLike } from './small-files.js';
+import { isOfSmall, limitOf, MOST_ENRICHED_OF_SMALL, noted, notedLike } from './small-files.js';
 import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
 import * as glue from './vesicle.js';
 import { RawVolume } from './vesicle.js';
@@ -304,7 +304,7 @@ export class Volume {
    */
   enrichSlices(options: { factor?: number; method?: 'flow' | 'linear' } = {}): Volume {
     const [factor, byFlow] = enrichment(options);
-    const most = isOfSmall(this) ? MOST_ENRICHED_OF_SMALL : undefined;
+    const most = limitOf(undefined, isOfSmall(this), MOST_ENRICHED_OF_SMALL);
     return this.#derived((raw) => raw.enrichSlices(factor, byFlow, most));
   }
 
@@ -326,7 +326,7 @@ export class Volume {
       enrichSlices: async (given = {}) => {
         const [factor, byFlow] = enrichment(given);
         signal?.throwIfAborted();
-        const most = isOfSmall(this) ? MOST_ENRICHED_OF_SMALL : undefined;
+        const most = limitOf(undefined, isOfSmall(this), MOST_ENRICHED_OF_SMALL);
         const work = new Handle('Volume', () => this.#handle.use((raw) => raw.enrichInSlices(factor, byFlow, most)));
         try {
           const raw = await runInSlices(() => work.use((one) => one.advance()), signal, budgetMs);

@@ -19,19 +19,19 @@ impl RawVolume {
         &self,
         factor: Option<usize>,
         flow: bool,
-        most: Option<f64>,
+        most: Option<u32>,
     ) -> Result<RawVolume, JsValue> {
         let pauses = Pauses::default();
-        let made = self.0.enrich_in_slices(factor, method(flow), whole(most), &pauses);
+        let made = self.0.enrich_in_slices(factor, method(flow), most.map(u64::from), &pauses);
         Ok(RawVolume(finished(made).map_err(Failure::from)?))
     }
 
     /// Begins to do the same in slices of work.
     #[wasm_bindgen(js_name = enrichInSlices)]
-    pub fn enrich_in_slices(&self, factor: Option<usize>, flow: bool, most: Option<f64>) -> RawEnrichment {
+    pub fn enrich_in_slices(&self, factor: Option<usize>, flow: bool, most: Option<u32>) -> RawEnrichment {
         let volume = self.0.clone();
         RawEnrichment(Box::pin(async move {
-            volume.enrich_in_slices(factor, method(flow), whole(most), &Pauses::default()).await
+            volume.enrich_in_slices(factor, method(flow), most.map(u64::from), &Pauses::default()).await
         }))
     }
 }
@@ -49,10 +49,6 @@ impl RawEnrichment {
             Poll::Ready(volume) => Ok(Some(RawVolume(volume.map_err(Failure::from)?))),
         }
     }
-}
-
-fn whole(bytes: Option<f64>) -> Option<u64> {
-    bytes.map(|bytes| bytes as u64)
 }
 
 fn method(flow: bool) -> Enrichment {

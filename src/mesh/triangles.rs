@@ -126,19 +126,13 @@ impl TriangleMesh {
     /// Returns what [`Self::components`] does, of a mesh whose components touch at no vertex, with less memory, and pauses
     /// meanwhile.
     pub(crate) async fn separate_components(&self, pauses: &Pauses) -> Vec<Self> {
-        let mut groups = DisjointSets::new(self.positions.len());
-        for triangles in self.triangles.chunks(CHUNK) {
-            for [a, b, c] in triangles.iter().map(|corners| corners.map(|v| v as usize)) {
-                groups.union(a, b);
-                groups.union(b, c);
-            }
-            pauses.after(triangles.len() / TRIANGLES_PER_UNIT).await;
-        }
+        let component = self.component_of_each_vertex();
+        pauses.now().await;
         let mut numbers = vec![u32::MAX; self.positions.len()];
         let mut members: Vec<Vec<usize>> = Vec::new();
         for (i, triangles) in self.triangles.chunks(CHUNK).enumerate() {
             for (t, corners) in (i * CHUNK..).zip(triangles) {
-                let number = &mut numbers[groups.find(corners[0] as usize)];
+                let number = &mut numbers[component[corners[0] as usize] as usize];
                 if *number == u32::MAX {
                     *number = members.len() as u32;
                     members.push(Vec::new());

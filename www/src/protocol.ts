@@ -278,8 +278,8 @@ export interface Requests extends CodeRequests {
       setup: Setup;
       frame: number;
       saved?: SavedRun | undefined;
-      /** Most vertices that surfaces of this image may have. */
-      maxVertices?: number | undefined;
+      /** Whether the image is in small files, or in a small session. */
+      isSmall?: boolean;
     };
     reply: Loaded;
   };

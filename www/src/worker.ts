@@ -59,11 +59,11 @@ const MOST_REPORTS = 50;
 /** The contents of a snapshot besides the surface: none, its measures, or measures and mesh checks. */
 type Detail = 'plain' | 'measured' | 'checked';
 
-/** An open volume, and the most vertices of its surfaces. */
+/** An open volume; `isSmall` tells whether it is in small files, or in a small session. */
 interface Image {
   volume?: Volume;
   large?: LargeVolume;
-  maxVertices: number | undefined;
+  isSmall: boolean;
 }
 
 const send = sender<WorkerEvent>();
@@ -72,8 +72,8 @@ class Session {
   /** The open volume; of one larger than memory, `#large`, only parts are read. */
   #volume: Volume | undefined;
   #large: LargeVolume | undefined;
-  /** Most vertices of surfaces of the volume; undefined if the library's own limit applies. */
-  #maxVertices: number | undefined;
+  /** Whether the volume is in small files, or in a small session. */
+  #isSmall = false;
   /** Origin of the volume, for the code of a run. */
   #origin: RunData | undefined;
   #model: DeformableModel | undefined;
@@ -132,18 +132,18 @@ class Session {
 
   async #load(body: Requests['load']['body'], signal: AbortSignal): Promise<Loaded> {
     await this.#pause();
-    const { name, source, setup, frame, saved, maxVertices } = body;
+    const { name, source, setup, frame, saved, isSmall = false } = body;
     if ('zarr' in source) return this.#loadLarge(source, body, signal);
     const { volume, frames, unit, voxels } = await openFrame(source, frame);
     try {
-      if (maxVertices !== undefined) checkPlanes(volume);
+      if (isSmall) checkPlanes(volume);
       const view: VolumeView = { ...viewOf(volume, name, voxels), ...displayOf(source), frames, ...(unit && { unit }) };
       const fitting = fittingSetup(setup, volume);
-      const model = saved ? restoredModel(volume, saved, maxVertices) : buildModel(volume, fitting, maxVertices);
+      const model = saved ? restoredModel(volume, saved, isSmall) : buildModel(volume, fitting, isSmall);
       // No checks of a new model: the page starts the run at once, and would not show their result.
       const ready = this.#replaceModel(model, fitting, saved ? 'checked' : 'measured');
       if (saved) this.#continue(saved);
-      this.#keep({ volume, maxVertices });
+      this.#keep({ volume, isSmall });
       const files = 'files' in source ? source.files.map(({ name, notes }) => ({ name, notes })) : [];
       this.#origin = { files, frame: frames > 1 ? frame : undefined, volume };
       this.#window = view.window;
@@ -160,17 +160,17 @@ class Session {
 
   async #loadLarge(
     source: LargeSource,
-    { name, setup, maxVertices }: Requests['load']['body'],
+    { name, setup, isSmall = false }: Requests['load']['body'],
     signal: AbortSignal,
   ): Promise<Loaded> {
     const { LargeVolume } = await import('./worker/large');
     const large = await LargeVolume.open(source, signal);
     try {
       const view = large.view(name);
-      if (maxVertices !== undefined) checkPlanes(view);
+      if (isSmall) checkPlanes(view);
       const fitting = { ...setup, levels: Math.min(setup.levels, large.coarserLevels) };
-      const ready = this.#replaceModel(large.model(fitting, maxVertices), fitting, 'measured');
-      this.#keep({ large, maxVertices });
+      const ready = this.#replaceModel(large.model(fitting, isSmall), fitting, 'measured');
+      this.#keep({ large, isSmall });
       this.#origin = { source, name, coarserLevels: large.coarserLevels };
       return withTransfer({ ...ready, volume: view, levels: fitting.levels }, [view.voxels]);
     } catch (error) {
@@ -180,18 +180,18 @@ class Session {
   }
 
   /** Makes a volume the open one, and frees the one before. */
-  #keep({ volume, large, maxVertices }: Image): void {
+  #keep({ volume, large, isSmall }: Image): void {
     this.#volume?.free();
     this.#large?.free();
     this.#volume = volume;
     this.#large = large;
-    this.#maxVertices = maxVertices;
+    this.#isSmall = isSmall;
     this.#data = undefined;
   }
 
   #build(setup: Setup): DeformableModel {
-    const most = this.#maxVertices;
-    return this.#large ? this.#large.model(setup, most) : buildModel(this.#image(), setup, most);
+    const isSmall = this.#isSmall;
+    return this.#large ? this.#large.model(setup, isSmall) : buildModel(this.#image(), setup, isSmall);
   }
 
   async #rebuild(setup: Setup): Promise<Ready> {
@@ -355,7 +355,7 @@ class Session {
   async #restore(saved: SavedRun): Promise<Ready> {
     await this.#pause();
     if (saved.levels === this.#levels) this.#current().restore(saved.state);
-    else this.#replaceBy(restoredModel(this.#image(), saved, this.#maxVertices));
+    else this.#replaceBy(restoredModel(this.#image(), saved, this.#isSmall));
     const model = this.#current();
     this.#continue(saved);
     this.#reportStopped();
@@ -381,7 +381,7 @@ class Session {
     await this.#pause();
     const image = this.#image();
     return this.#comparison.begin((signal) =>
-      compare(image, setup, this.#maxVertices, signal, (run, report) => send({ event: 'comparing', run, report })),
+      compare(image, setup, this.#isSmall, signal, (run, report) => send({ event: 'comparing', run, report })),
     );
   }
 

@@ -2,8 +2,6 @@
 //! inflate the surface for ever.
 
 use crate::math::{Bounds, Vec3};
-use crate::mesh::{Mesh, TriangleMesh};
-use crate::methods::MethodError;
 
 /// The size of the domain, the box in which vertices must stay, as a multiple of the rounded box around the whole
 /// image.
@@ -85,18 +83,6 @@ impl Domain {
     /// Returns the largest number of triangles of a contour.
     pub(super) fn most_triangles(&self) -> usize {
         self.max_vertices.saturating_mul(TRIANGLES_PER_VERTEX).min(MOST_TRIANGLES)
-    }
-
-    /// Returns a mesh of a contour whose edges are still to be brought within bounds.
-    ///
-    /// # Errors
-    /// [`MethodError::TooManyVertices`] if it has more than twice the vertices that a surface may have; edits remove half
-    /// of those of a contour, or more. [`MethodError::Mesh`].
-    pub(super) fn start_mesh(&self, contour: &TriangleMesh) -> Result<Mesh, MethodError> {
-        if contour.positions.len() > 2 * self.max_vertices {
-            return Err(MethodError::TooManyVertices { most: self.max_vertices });
-        }
-        Ok(Mesh::from_triangles(contour)?)
     }
 
     /// Returns the approximate number of vertices of the enclosing start surface for the lower edge bound `delta`, δ,

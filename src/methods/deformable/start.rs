@@ -93,6 +93,19 @@ impl<'a> StartContext<'a> {
         ContourRule { iso: self.iso, object: self.object, smallest_part: self.smallest_part, most }
     }
 
+    /// Returns the mesh of a contour whose edges are still to be brought within bounds.
+    ///
+    /// # Errors
+    /// [`MethodError::TooManyVertices`] if it has more than twice the vertices that a surface may have: edits remove half
+    /// of those of a contour, or more. [`MethodError::Mesh`].
+    fn mesh_of(&self, contour: &TriangleMesh) -> Result<Mesh, MethodError> {
+        let most = self.domain.max_vertices;
+        if contour.positions.len() > 2 * most {
+            return Err(MethodError::TooManyVertices { most });
+        }
+        Ok(Mesh::from_triangles(contour)?)
+    }
+
     fn most_vertices(&self) -> usize {
         self.domain.most_vertices(self.sampling.shortest())
     }
@@ -419,7 +432,7 @@ pub(super) async fn contour_mesh(
     }
     let surface = simplified(surface, context.image, context.sampling.shortest(), pauses).await;
     pauses.now().await;
-    Ok(Some(context.domain.start_mesh(&surface)?))
+    Ok(Some(context.mesh_of(&surface)?))
 }
 
 async fn iso_surface(context: &StartContext<'_>, iso: f32, pauses: &Pauses) -> Result<Mesh, MethodError> {
@@ -432,7 +445,7 @@ async fn iso_surface(context: &StartContext<'_>, iso: f32, pauses: &Pauses) -> R
             "the image has no surface at this intensity",
         ));
     }
-    context.domain.start_mesh(&placed(surface, position))
+    context.mesh_of(&placed(surface, position))
 }
 
 async fn caller_mesh(

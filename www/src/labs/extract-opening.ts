@@ -30,9 +30,6 @@ interface OpenedVolume extends Loaded {
   moments?: ExtractMoments | undefined;
 }
 
-/** Most vertices of the surface of an image in small files: with more, the page takes over a gigabyte. */
-const MOST_OF_SMALL = 300_000;
-
 /** Opens volumes in the Extract lab, and builds models of them. */
 export class ExtractOpening extends Opening<Example, Linked, ImageSource, OpenedVolume> {
   protected readonly first = EXAMPLES[0];
@@ -128,8 +125,8 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     const { saved, page } = moments?.now ?? {};
     const choice = page?.choice ?? (reopening ? this.#ui.start.inForce : this.#startFor(source, volume));
     const setup = reopening || page ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
-    const maxVertices = isOfSmall(source.session, storedIn(volume)) ? MOST_OF_SMALL : undefined;
-    const body = { name: source.name, source: volume, setup, frame: frameOf(source), saved, maxVertices };
+    const isSmall = isOfSmall(source.session, storedIn(volume));
+    const body = { name: source.name, source: volume, setup, frame: frameOf(source), saved, isSmall };
     const loaded = await this.#client.request('load', body, transferable(volume));
     return { ...loaded, choice: { ...choice, levels: loaded.levels }, setup, moments };
   }

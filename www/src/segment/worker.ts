@@ -2,7 +2,7 @@
 
 import { LabelSurfaces, type Volume } from 'vesicle';
 import { quantize } from '../quantize';
-import { areSmall } from '../small-files';
+import { areSmall, SEGMENT_OF_SMALL } from '../small-files';
 import { text } from '../texts';
 import type { Warning } from '../warnings';
 import { Refusal } from '../worker/refusal';
@@ -25,9 +25,6 @@ import type {
 import { forEachRow } from './region';
 import { withLabels } from './slicer';
 import { mapLike, type OpenMap, type OpenVolume, openImage, openLabels } from './source';
-
-/** Most vertices of the surfaces of labels in small files, and in small sessions: with more, the page takes over a gigabyte. */
-const MOST_OF_SMALL = 500_000;
 
 let maps = 0;
 
@@ -54,8 +51,7 @@ class LiveMap {
     this.map = mapLike(image, voxels, warnings);
     this.#voxelVolume = Math.abs(determinant(image.volume.affine));
     try {
-      const most = isSmall && { maxVertices: MOST_OF_SMALL };
-      this.surfaces = new LabelSurfaces({ volume: this.map, ...params, ...most });
+      this.surfaces = new LabelSurfaces({ volume: this.map, ...params, ...(isSmall && SEGMENT_OF_SMALL) });
       if (state) this.surfaces.restore(state);
     } catch (error) {
       this.map.free();

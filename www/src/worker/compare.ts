@@ -26,15 +26,13 @@ type OnReport = (run: ComparisonProgressEvent['run'], report: StepReport) => voi
 export async function compare(
   volume: Volume,
   setup: Setup,
-  maxVertices: number | undefined,
+  isSmall: boolean,
   signal: AbortSignal,
   onReport: OnReport,
 ): Promise<Requests['compare']['reply']> {
   try {
-    const direct = await once(volume, { ...setup, levels: 0 }, maxVertices, signal, (report) =>
-      onReport('direct', report),
-    );
-    const coarseToFine = await once(volume, setup, maxVertices, signal, (report) => onReport('coarseToFine', report));
+    const direct = await once(volume, { ...setup, levels: 0 }, isSmall, signal, (report) => onReport('direct', report));
+    const coarseToFine = await once(volume, setup, isSmall, signal, (report) => onReport('coarseToFine', report));
     return { direct, coarseToFine };
   } catch (error) {
     if (signal.aborted) return undefined;
@@ -45,11 +43,11 @@ export async function compare(
 async function once(
   volume: Volume,
   setup: Setup,
-  maxVertices: number | undefined,
+  isSmall: boolean,
   signal: AbortSignal,
   onReport: (report: StepReport) => void,
 ): Promise<ExtractionRun> {
-  const model = buildModel(volume, setup, maxVertices);
+  const model = buildModel(volume, setup, isSmall);
   try {
     const byLevel = Array.from({ length: setup.levels + 1 }, (_, i) => ({
       level: setup.levels - i,

@@ -51,10 +51,10 @@ export class LargeVolume {
   }
 
   /** Builds a model that starts on the coarsest level, and ends as many levels below as the set-up says. */
-  model(setup: Setup, maxVertices?: number): DeformableModel {
+  model(setup: Setup, isSmall?: boolean): DeformableModel {
     const coarser = this.coarserLevels;
     if (setup.levels > coarser) throw new Refusal('invalid-argument', text('extract.largeLevels', { most: coarser }));
-    const { levels, ...options } = modelOptions(this.#coarsest, setup, maxVertices);
+    const { levels, ...options } = modelOptions(this.#coarsest, setup, isSmall);
     const image = { volume: this.#image, finest: coarser - levels, ...(setup.box && { box: setup.box }) };
     return withAttractors(setup, () => new DeformableModel({ ...options, ...image }));
   }

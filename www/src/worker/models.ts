@@ -4,6 +4,7 @@
  */
 import { DeformableModel, type Volume } from 'vesicle';
 import type { SavedRun, Setup, VertexQuantity } from '../protocol';
+import { EXTRACT_OF_SMALL } from '../small-files';
 import { otsu } from '../threshold';
 import { HISTOGRAM_BINS } from './volumes';
 
@@ -25,14 +26,14 @@ export function startOf({ start }: Setup, iso: number): Options['start'] {
 }
 
 /** Returns the options of the model of a set-up; if that has no iso value, one is chosen from the histogram of `volume`. */
-export function modelOptions(volume: Volume, setup: Setup, maxVertices?: number) {
+export function modelOptions(volume: Volume, setup: Setup, isSmall = false) {
   const chosen = setup.params.iso;
   const iso = typeof chosen === 'number' ? chosen : otsu(volume.histogram(HISTOGRAM_BINS), volume.range);
   return {
     start: startOf(setup, iso),
     levels: setup.levels,
     ...(setup.edge === undefined ? {} : { edge: setup.edge }),
-    ...(maxVertices !== undefined && { maxVertices }),
+    ...(isSmall && EXTRACT_OF_SMALL),
     params: { ...setup.params, iso },
   };
 }
@@ -56,14 +57,13 @@ export function fittingSetup(setup: Setup, volume: Volume): Setup {
   return { ...setup, levels: Math.min(setup.levels, DeformableModel.maxLevels(volume)) };
 }
 
-export function buildModel(volume: Volume, setup: Setup, maxVertices?: number): DeformableModel {
-  return withAttractors(setup, () => new DeformableModel({ ...modelOptions(volume, setup, maxVertices), volume }));
+export function buildModel(volume: Volume, setup: Setup, isSmall?: boolean): DeformableModel {
+  return withAttractors(setup, () => new DeformableModel({ ...modelOptions(volume, setup, isSmall), volume }));
 }
 
 /** Builds a model with the state of a saved run; its own initial surface is replaced at once. */
-export function restoredModel(volume: Volume, { state, levels }: SavedRun, maxVertices?: number): DeformableModel {
-  const most = maxVertices !== undefined && { maxVertices };
-  const model = new DeformableModel({ volume, levels, start: 'enclosing', ...most });
+export function restoredModel(volume: Volume, { state, levels }: SavedRun, isSmall?: boolean): DeformableModel {
+  const model = new DeformableModel({ volume, levels, start: 'enclosing', ...(isSmall && EXTRACT_OF_SMALL) });
   try {
     model.restore(state);
   } catch (error) {
