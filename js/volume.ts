@@ -276,7 +276,13 @@ export class Volume {
     const { factor = Math.sqrt(3) } = checkProperties('options', options, ['factor']);
     integer('levels', levels, { min: 1 });
     number('factor', factor);
-    return this.#handle.use((raw) => raw.pyramid(levels, factor)).map((level) => wrap(() => level));
+    const raw = this.#handle.use((raw) => raw.pyramid(levels, factor));
+    return raw.map((level) =>
+      notedLike(
+        this,
+        wrap(() => level),
+      ),
+    );
   }
 
   /**

@@ -4,7 +4,7 @@ import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
 import { type Pause, withPause } from '../pause.js';
 import { Handle } from '../runtime.js';
-import { unpackingProblem } from '../small-files.js';
+import { noted, unpackingProblem } from '../small-files.js';
 import { SPARSE_SOURCE, type SparseSource } from '../sparse.js';
 import { checkSignal } from '../stepper.js';
 import { RawSparseVolume } from '../vesicle.js';
@@ -118,7 +118,13 @@ export class ZarrVolume {
     const affine = from.info.affine.slice();
     for (const axis of [0, 1, 2] as const) affine[12 + axis] = world(from.info, min, axis);
     const warnings = this.warnings.length > 0 && { warnings: this.warnings };
-    return { data: target.data, dims, affine, ...(this.unit && { unit: this.unit }), ...warnings };
+    return {
+      data: noted(target.data, this.#stored()),
+      dims,
+      affine,
+      ...(this.unit && { unit: this.unit }),
+      ...warnings,
+    };
   }
 
   /**

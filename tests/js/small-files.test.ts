@@ -82,6 +82,8 @@ const SMALL = {
   'frames of small files': async () => Volume.fromFrames([Volume.parse(nrrd('gzip')), Volume.parse(nrrd('gzip'))]),
   readTiff: async () => new Volume(await readTiff([{ name: 'rods.tif', bytes: tiff() }])),
   openZarr: zarr,
+  'a region of openZarr': async () => (await zarr()).region(0, { min: [0, 0, 0], max: [SIZE, SIZE, SIZE] }),
+  'a level of a pyramid': async () => Volume.parse(nrrd('gzip')).pyramid(1)[0] as Volume,
 };
 
 const options = { params: { iso: 100, smallestPart: 1 } };
