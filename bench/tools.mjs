@@ -4,8 +4,10 @@ import { normalNumber, randomNumbers } from './random.mjs';
 
 /** Voxels along each side of the label map, its number of labels, and the radius of the ball that they fill. */
 const [SIDE, LABELS, BALL] = [192, 30, 90];
+/** Voxels along each side of the label map of noise. */
+const NOISE = 64;
 /** Voxels along each side of the image whose noisy surface the tools work on, and of the distances. */
-const [IMAGE, DISTANCES] = [128, 256];
+export const [IMAGE, DISTANCES] = [128, 256];
 
 export const ITERATIONS = 20;
 /** Share of the triangles that decimation keeps. */
@@ -14,16 +16,16 @@ export const KEPT = 0.1;
 export const WITHIN = 0.2;
 
 /** A ball that is divided into the cells around random points, each a label. */
-export function labelMap() {
+export function labelMap(side = SIDE, labels = LABELS, ball = BALL) {
   const random = randomNumbers(4);
-  const coordinate = () => SIDE / 2 + BALL * (1.6 * random() - 0.8);
-  const centres = Array.from({ length: LABELS }, () => [coordinate(), coordinate(), coordinate()]);
-  const data = new Uint8Array(SIDE ** 3);
-  const middle = (SIDE - 1) / 2;
-  for (let z = 0, at = 0; z < SIDE; z++)
-    for (let y = 0; y < SIDE; y++)
-      for (let x = 0; x < SIDE; x++, at++) {
-        if (Math.hypot(x - middle, y - middle, z - middle) > BALL) continue;
+  const coordinate = () => side / 2 + ball * (1.6 * random() - 0.8);
+  const centres = Array.from({ length: labels }, () => [coordinate(), coordinate(), coordinate()]);
+  const data = new Uint8Array(side ** 3);
+  const middle = (side - 1) / 2;
+  for (let z = 0, at = 0; z < side; z++)
+    for (let y = 0; y < side; y++)
+      for (let x = 0; x < side; x++, at++) {
+        if (Math.hypot(x - middle, y - middle, z - middle) > ball) continue;
         let [least, nearest] = [Infinity, 0];
         centres.forEach(([a, b, c], label) => {
           const square = (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2;
@@ -31,7 +33,14 @@ export function labelMap() {
         });
         data[at] = nearest + 1;
       }
-  return { data, dims: [SIDE, SIDE, SIDE] };
+  return { data, dims: [side, side, side] };
+}
+
+/** A label map in which each voxel has one of 254 labels, or none, at random. */
+export function labelNoise() {
+  const random = randomNumbers(2);
+  const data = Uint8Array.from({ length: NOISE ** 3 }, () => Math.floor(255 * random()));
+  return { data, dims: [NOISE, NOISE, NOISE] };
 }
 
 /** Marching cubes of waves in a ball, with noise that leaves the surface rough. */
@@ -72,15 +81,20 @@ function surfacesOf(volume) {
   return surfaces;
 }
 
-function lookAtLabels(surfaces) {
-  let [triangles, selfIntersections] = [0, 0];
+/** Returns the size and quality of the surfaces of a label map; the error of volume is the largest of a label. */
+function lookAtLabels(surfaces, { data }) {
+  const voxels = new Map();
+  for (const label of data) voxels.set(label, (voxels.get(label) ?? 0) + 1);
+  let [triangles, selfIntersections, volumeError] = [0, 0, 0];
   for (const label of surfaces.labels) {
     const mesh = surfaces.mesh(label);
     triangles += mesh.triangleCount;
     selfIntersections += mesh.check().selfIntersections;
+    const error = mesh.info().volume / voxels.get(label) - 1;
+    if (Math.abs(error) > Math.abs(volumeError)) volumeError = error;
     mesh.free();
   }
-  return { triangles, selfIntersections };
+  return { triangles, selfIntersections, volumeError };
 }
 
 /** Returns milliseconds and results of each task. */
@@ -102,8 +116,20 @@ export async function measure(repeats) {
   return {
     version: version(),
     triangles: mesh.triangleCount,
+    volume: before,
     tasks: {
-      labels: timed(repeats, () => new Volume(map), surfacesOf, lookAtLabels),
+      noise: timed(
+        repeats,
+        () => new Volume(labelNoise()),
+        surfacesOf,
+        () => ({}),
+      ),
+      labels: timed(
+        repeats,
+        () => new Volume(map),
+        surfacesOf,
+        (surfaces) => lookAtLabels(surfaces, map),
+      ),
       smooth: tool((one) => one.smooth({ iterations: ITERATIONS })),
       distance: timed(
         repeats,

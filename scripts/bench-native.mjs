@@ -38,6 +38,20 @@ export async function remeshNatively() {
   return { host: 'native', rows: readTable(printed).map(remeshRow) };
 }
 
+/** Returns the native milliseconds of the tasks of bench/tools.mjs, on its mesh and label map. */
+export async function toolsNatively(repeats) {
+  const { labelMap, labelNoise, roughMesh, ...sizes } = await import('../bench/tools.mjs');
+  const [mesh, map, noise] = [roughMesh(), labelMap(), labelNoise()];
+  return inFolder(async (folder) => {
+    const files = ['mesh.ply', 'labels.bin', 'noise.bin'].map((name) => join(folder, name));
+    await Promise.all([mesh.toBytes('ply'), map.data, noise.data].map((bytes, k) => writeFile(files[k], bytes)));
+    mesh.free();
+    const { ITERATIONS, KEPT, WITHIN, IMAGE, DISTANCES } = sizes;
+    const given = [...files, map.dims[0], noise.dims[0], repeats, ITERATIONS, KEPT, WITHIN, IMAGE, DISTANCES];
+    return JSON.parse(await example('tool_figures', given.map(String)));
+  });
+}
+
 /** Parses a printed table into row objects whose keys are the words of its first line. */
 function readTable(printed) {
   const [head, ...lines] = printed.trim().split('\n');

@@ -12,8 +12,8 @@ const CHEAP = 10;
 
 export const PYTHON = process.env.VESICLE_PYTHON ?? 'python3';
 
-/** Load average of the machine before the benches start. */
-const [load] = loadavg();
+/** Load average of the machine before the benches start, and its number of cores. */
+export const MACHINE = { load: loadavg()[0], cores: cpus().length };
 
 /**
  * Returns a row for each task and package, with the figures of both sides or the reason why the package was skipped.
@@ -23,7 +23,7 @@ export async function comparePeers(scan, repeats) {
   return inFolder(async (folder) => {
     const found = await measureTheirs(await writeJob(folder, scan, repeats));
     const rows = all.flatMap((task) => task.packages.map((name) => compare(task, name, found)));
-    return { bestOf: repeats, load, cores: cpus().length, rows: await Promise.all(rows) };
+    return { bestOf: repeats, ...MACHINE, rows: await Promise.all(rows) };
   });
 }
 
@@ -36,7 +36,7 @@ async function measureOurs(scan, repeats) {
   return { head, points, remesh: await remeshNatively() };
 }
 
-const PER_RUN = { unit: 'ms', figure: ({ milliseconds }) => milliseconds };
+export const PER_RUN = { unit: 'ms', figure: ({ milliseconds }) => milliseconds };
 const PER_TRIANGLE = {
   unit: 'µs per triangle',
   figure: ({ milliseconds, triangles }) => (1000 * milliseconds) / triangles,
@@ -106,46 +106,6 @@ async function writeMeshes(folder) {
   return written;
 }
 
-/** Compares the surfaces of a label map and tools for meshes with those of other packages. */
-export async function compareTools(repeats) {
-  const { labelMap, measure, roughMesh, ITERATIONS, KEPT } = await import('../bench/tools.mjs');
-  const host = `Node ${process.versions.node}`;
-  const { tasks, triangles } = await measure(repeats);
-  const size = `${triangles.toLocaleString('en')} triangles`;
-  const named = [
-    { task: 'labels', name: 'Surfaces of a label map, 192³ voxels, 30 labels that touch', packages: ['vtk'] },
-    { task: 'smooth', name: `Smoothing, ${ITERATIONS} iterations, ${size}`, packages: ['pymeshlab'] },
-    { task: 'decimate', name: `Decimation to a tenth, ${size}`, packages: ['pymeshlab', 'vtk'] },
-    { task: 'decimate within', name: `Decimation within .2 voxels, ${size}`, packages: [] },
-    { task: 'distance', name: `Signed distances, 256³ voxels, ${size}`, packages: [] },
-  ];
-  return inFolder(async (folder) => {
-    const [mesh, map] = [roughMesh(), labelMap()];
-    const paths = ['positions', 'indices', 'labels'].map((name) => join(folder, `${name}.bin`));
-    const { positions, indices } = mesh.arrays();
-    await Promise.all([positions, indices, map.data].map((array, k) => writeFile(paths[k], array)));
-    mesh.free();
-    const job = {
-      ...{ packages: ['vtk', 'pymeshlab'], repeats, iterations: ITERATIONS, kept: KEPT },
-      mesh: { positions: paths[0], indices: paths[1] },
-      labels: { file: paths[2], side: map.dims[0] },
-    };
-    const file = join(folder, 'job.json');
-    await writeFile(file, JSON.stringify(job));
-    const found = await measureTheirs(file);
-    const rows = named.flatMap((one) => {
-      const task = { host, ...PER_RUN, ...one, ours: tasks[one.task] };
-      return task.packages.length > 0 ? task.packages.map((name) => compare(task, name, found)) : [alone(task)];
-    });
-    return { bestOf: repeats, load, cores: cpus().length, rows: await Promise.all(rows) };
-  });
-}
-
-const alone = ({ task, name, unit, figure, host, ours }) => ({
-  ...{ task, name, unit },
-  ours: { host, figure: figure(ours), ...counts(ours) },
-});
-
 /** Formats an array as lines of three numbers each, after the prefix `first`. */
 function lines(array, first = '') {
   const line = (_, k) => `${first}${array[3 * k]} ${array[3 * k + 1]} ${array[3 * k + 2]}`;
@@ -158,7 +118,8 @@ function offOf({ positions, indices }) {
   return `${['OFF', counts, ...lines(positions), ...lines(indices, '3 ')].join('\n')}\n`;
 }
 
-async function measureTheirs(job) {
+/** Runs bench/peers.py and returns its results, or why there are none. */
+export async function measureTheirs(job) {
   const { code, output } = await run(PYTHON, [at('bench/peers.py'), job], { echo: false });
   if (code !== 0) return { absent: `${PYTHON} cannot run bench/peers.py: ${output.trim().split('\n').at(-1)}` };
   return { results: JSON.parse(output.trim().split('\n').at(-1)) };
@@ -168,33 +129,44 @@ async function measureTheirs(job) {
  * Returns the row of a task and a package. A result without a task explains all tasks of its package that have no
  * result.
  */
-async function compare({ task, name, unit, figure, host, ours }, wanted, { results = [], absent }) {
+export async function compare(given, wanted, { results = [], absent }) {
+  const { task, name, unit, figure, host, ours, volume } = given;
   const from = results.filter(({ package: name }) => name === wanted);
   const found = from.find((one) => one.task === task) ?? from.find((one) => !one.task);
   const mine = { host, figure: figure(ours), ...counts(ours) };
   const row = { task, name, unit, package: wanted, version: found?.version, ours: mine };
   if (found?.milliseconds === undefined) return { ...row, skipped: found?.absent ?? absent ?? 'nothing came of it' };
-  const theirs = { what: found.what, figure: figure(found), ...counts(found), ...(await looked(found.files)) };
+  const theirs = { what: found.what, figure: figure(found), ...counts(found), ...(await looked(found, volume)) };
   return { ...row, theirs, ratio: mine.figure / theirs.figure };
 }
 
-const COUNTED = ['vertices', 'triangles', 'iterations', 'converged', 'volume', 'minAngleDegrees', 'selfIntersections'];
+const COUNTED = [
+  ...['vertices', 'triangles', 'iterations', 'converged', 'volume', 'volumeError', 'minAngleDegrees'],
+  'selfIntersections',
+];
 
-const counts = (of) => Object.fromEntries(COUNTED.filter((name) => name in of).map((name) => [name, of[name]]));
+/** Returns the counts and measures among the fields of a result. */
+export const counts = (of) => Object.fromEntries(COUNTED.filter((name) => name in of).map((name) => [name, of[name]]));
 
 /**
- * Returns the smallest angle and the number of self-intersections of another package's mesh, measured by this library.
+ * Returns the quality of another package's mesh, measured by this library: its smallest angle, self-intersections, and
+ * the error of its volume if `volume` is known; or the self-intersections of its `parts` and how many are no closed surface.
  */
-async function looked(files) {
+async function looked({ files, parts }, volume) {
+  if (parts) {
+    const found = await Promise.all(parts.map((one) => looked({ files: one })));
+    const selfIntersections = found.reduce((sum, one) => sum + (one.selfIntersections ?? 0), 0);
+    return { selfIntersections, parts: parts.length, notClosed: found.filter(({ refused }) => refused).length };
+  }
   if (!files) return {};
   const { Mesh } = await import('../pkg/index.js');
   const [positions, indices] = await Promise.all([readFile(files.positions), readFile(files.indices)]);
   try {
     const mesh = Mesh.fromArrays(new Float32Array(bufferOf(positions)), new Uint32Array(bufferOf(indices)));
-    const { minAngleDegrees } = mesh.info();
+    const { minAngleDegrees, volume: found } = mesh.info();
     const { selfIntersections } = mesh.check();
     mesh.free();
-    return { minAngleDegrees, selfIntersections };
+    return { minAngleDegrees, selfIntersections, ...(volume && { volumeError: found / volume - 1 }) };
   } catch (error) {
     return { refused: error.message };
   }
@@ -218,6 +190,7 @@ export function peerRows({ rows, bestOf }) {
 const heading = (row) => [
   [row.name, '', ''],
   [`  ours, ${row.ours.host}`, shown(row, row.ours), `        ${sizes(row.ours)}`],
+  ...(row.native ? [['  ours, native', shown(row, row.native), '']] : []),
 ];
 
 const skippedLine = (row) => [`  ${row.package}`, '–', `        skipped: ${row.skipped}`];
@@ -231,18 +204,25 @@ function peerLine(row) {
 /** Removes the post-release number from a version. */
 const short = (version) => version.replace(/\.post\d+$/, '');
 
-function shown({ unit }, { figure }) {
+export const percent = (share) => `${(100 * share).toPrecision(2)} %`;
+
+/** Formats the figure of a row's side. */
+export function shown({ unit }, { figure }) {
   if (unit !== 'ms') return `${figure.toFixed(1)} µs`;
   return figure < 1000 ? `${figure.toFixed(0)} ms` : `${(figure / 1000).toFixed(2)} s`;
 }
 
-function sizes({ vertices, triangles, volume, minAngleDegrees, selfIntersections, refused }) {
+function sizes(of) {
+  const { vertices, triangles, volume, volumeError, minAngleDegrees, selfIntersections, notClosed, parts, refused } =
+    of;
   const words = [];
   if (vertices) words.push(`${vertices} vertices`);
   if (triangles) words.push(`${triangles} triangles`);
   if (volume) words.push(`${(volume / 1000).toFixed(0)} cm³`);
+  if (volumeError !== undefined) words.push(`volume off by ${percent(volumeError)}`);
   if (minAngleDegrees !== undefined) words.push(`${minAngleDegrees.toFixed(1)}° at least`);
   if (selfIntersections !== undefined) words.push(`${selfIntersections} self-intersections`);
+  if (notClosed) words.push(`${notClosed} of ${parts} surfaces not closed or manifold`);
   if (refused) words.push(`no closed surface: ${refused}`);
   return words.join(', ');
 }

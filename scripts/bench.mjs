@@ -1,11 +1,13 @@
 // Runs the benches of all methods in Node and Chromium and, for those that have a native program, natively; measures
 // the app in Chromium; and compares with other software. Prints tables and writes bench.json. `npm run bench -- points`
-// runs a single bench and writes nothing; `hosts` runs only when it is named.
+// runs a single bench and writes nothing. `hosts` and `tools` run only when they are named; `tools` writes the figures of
+// docs/performance.md.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
 import { buildApp } from './app.mjs';
 import { remeshNatively, stepsNatively } from './bench-native.mjs';
-import { comparePeers, compareTools, peerRows } from './bench-peers.mjs';
+import { comparePeers, peerRows } from './bench-peers.mjs';
+import { compareTools, toolRows, writePerformance } from './bench-tools.mjs';
 import { build } from './build.mjs';
 import { launchChromium } from './chromium.mjs';
 import { serve } from './serve.mjs';
@@ -78,8 +80,8 @@ const BENCHES = {
   tools: {
     // For docs/performance.md; not part of the report.
     apart: true,
-    alone: () => compareTools(REPEATS),
-    rows: peerRows,
+    alone: async () => writePerformance(await compareTools(REPEATS)),
+    rows: toolRows,
   },
   peers: {
     alone: () => comparePeers(SCAN, REPEATS),
