@@ -2,6 +2,7 @@
 import type { Array as ZarrArray } from 'zarrita';
 import { integer, invalid } from '../check.js';
 import type { Vec3, VoxelArray } from '../data.js';
+import { type Pause, withPause } from '../pause.js';
 import { Abandoned, type Brick } from './cache.js';
 import { withSlack } from './codecs.js';
 import { badZarr, shown, tooLarge, translated, type Zarrita } from './error.js';
@@ -29,8 +30,11 @@ const TYPES: Record<string, [ZarrVoxelType, VoxelArrays]> = {
 /** Largest number of voxels along an axis. */
 const MOST_VOXELS = 0xffffffff;
 
-/** Largest number of bytes of a chunk, decoded, with all channels and times, and of all that are decoded at a time. */
+/** Largest number of bytes of a chunk, decoded, with all channels and times. */
 const LARGEST_CHUNK = 2 ** 28;
+
+/** Largest number of bytes of all chunks that are decoded at a time, unless one has more: decoding takes several times as many. */
+const DECODED_AT_A_TIME = 2 ** 27;
 
 /**
  * How far apart the fields of view of two levels may be, in voxels of the coarser one: those that fit only in part may
@@ -71,7 +75,7 @@ export class Level {
       throw badZarr(`${this.#part}.data_type`, `must be one of ${known}, got ${shown(array.dtype)}`);
     }
     this.#chunkBytes = chunkBytes(array, this.#part);
-    this.#decoders = new Slots(Math.max(1, Math.floor(LARGEST_CHUNK / this.#chunkBytes)));
+    this.#decoders = new Slots(Math.max(1, Math.floor(DECODED_AT_A_TIME / this.#chunkBytes)));
     this.#spatial = spatialAxes(axes);
     this.#selected = axes.map((axis, index) => selected(axis, array.shape[index] as number, selection));
     this.VoxelArrays = type[1];
@@ -131,7 +135,8 @@ export class Level {
     await this.#decoders.take(signal);
     try {
       const stored = await this.#chunk(position, part, signal);
-      return { min, dims: size, data: stored && this.#voxels(stored, size, part) };
+      const data = stored && (await withPause(signal, (pause) => this.#voxels(stored, size, part, pause)));
+      return { min, dims: size, data };
     } finally {
       this.#decoders.release();
     }
@@ -157,23 +162,41 @@ export class Level {
   }
 
   /** Returns the first voxels of the selected channel and time of a chunk, x fastest. */
-  #voxels({ data, stride }: Stored, [nx, ny, nz]: Vec3, part: string): VoxelArray {
+  async #voxels({ data, stride }: Stored, dims: Vec3, part: string, pause: Pause): Promise<VoxelArray> {
     const first = this.#selected.reduce(
       (sum, index, axis) => sum + (index % (this.#array.chunks[axis] as number)) * (stride[axis] as number),
       0,
     );
-    const [sx, sy, sz] = this.#along(stride, 0);
-    if (isDense(data, this.VoxelArrays, [nx, ny, nz], [sx, sy, sz])) return data;
-    const voxels = new this.VoxelArrays(nx * ny * nz);
-    for (let z = 0, to = 0; z < nz; z++) {
-      for (let y = 0; y < ny; y++, to += nx) {
-        const start = first + z * sz + y * sy;
-        if (isLong(data)) shortenRow(data, start, sx, voxels.subarray(to, to + nx), part);
-        else copyRow(data, start, sx, voxels, to, nx);
+    const strides = this.#along(stride, 0);
+    const [sx, sy, sz] = strides;
+    if (isDense(data, this.VoxelArrays, dims, strides)) return data;
+    const voxels = new this.VoxelArrays(volumeOf(dims));
+    const [nx, ny] = dims;
+    for (const { min, end } of blocks(dims, sx === 1)) {
+      await pause.turn();
+      const [x, count] = [min[0], end[0] - min[0]];
+      for (let z = min[2]; z < end[2]; z++) {
+        for (let y = min[1]; y < end[1]; y++) {
+          const [start, to] = [first + x * sx + y * sy + z * sz, x + nx * (y + ny * z)];
+          if (isLong(data)) shortenRow(data, start, sx, voxels.subarray(to, to + count), part);
+          else copyRow(data, start, sx, voxels, to, count);
+        }
       }
     }
     return voxels;
   }
+}
+
+/** Side of the blocks in which voxels are copied: in another order, each line of the cache is used while it is there. */
+const BLOCK = 16;
+
+/** Yields the blocks of a box, of whole rows if that is wanted. */
+function* blocks([nx, ny, nz]: Vec3, areRows: boolean): Generator<{ min: Vec3; end: Vec3 }> {
+  const width = areRows ? nx : BLOCK;
+  for (let z = 0; z < nz; z += BLOCK)
+    for (let y = 0; y < ny; y += BLOCK)
+      for (let x = 0; x < nx; x += width)
+        yield { min: [x, y, z], end: [Math.min(x + width, nx), Math.min(y + BLOCK, ny), Math.min(z + BLOCK, nz)] };
 }
 
 /** Integers of 64 bits. */

@@ -11,6 +11,8 @@ interface ArrayJson {
   shape: number[];
   chunks: number[];
   type?: string;
+  /** Order in which the axes are stored, if not as they are. */
+  order?: number[];
   codecs?: object[];
   fill?: number;
 }
@@ -18,7 +20,8 @@ interface ArrayJson {
 const json = (value: unknown) => new TextEncoder().encode(JSON.stringify(value));
 
 /** Returns the files of an image with one level. */
-function image({ shape, chunks, type = 'uint8', codecs = [], fill = 0 }: ArrayJson): Map<string, Uint8Array> {
+function image({ shape, chunks, type = 'uint8', order, codecs = [], fill = 0 }: ArrayJson): Map<string, Uint8Array> {
+  const transpose = order ? [{ name: 'transpose', configuration: { order } }] : [];
   const axes = ['z', 'y', 'x'].map((name) => ({ name, type: 'space' }));
   const scale = [{ type: 'scale', scale: [1, 1, 1] }];
   const multiscales = [{ axes, datasets: [{ path: '0', coordinateTransformations: scale }] }];
@@ -27,7 +30,7 @@ function image({ shape, chunks, type = 'uint8', codecs = [], fill = 0 }: ArrayJs
     ...{ zarr_format: 3, node_type: 'array', shape, data_type: type, fill_value: fill },
     chunk_grid: { name: 'regular', configuration: { chunk_shape: chunks } },
     chunk_key_encoding: { name: 'default', configuration: { separator: '/' } },
-    codecs: [{ name: 'bytes', configuration: { endian: 'little' } }, ...codecs],
+    codecs: [...transpose, { name: 'bytes', configuration: { endian: 'little' } }, ...codecs],
     attributes: {},
   };
   return new Map([
@@ -75,6 +78,47 @@ const zstdSized = (size: number) =>
 /** A header that states how many bytes follow once they are decoded. */
 const bloscOf = (bytes: number) => Uint8Array.from([2, 1, 1, 1, ...u32(bytes), ...u32(bytes), ...u32(32), 0, 0, 0, 0]);
 const u32 = (value: number) => [value & 255, (value >> 8) & 255, (value >> 16) & 255, value >>> 24];
+
+describe('chunks whose axes are stored in another order', () => {
+  test.each([[[2, 1, 0]], [[1, 2, 0]], [[0, 2, 1]]])('%j: each voxel is at its place', async (order) => {
+    const shape = [33, 20, 50];
+    const [, ny, nx] = shape as [number, number, number];
+    const stored = order.map((axis) => shape[axis] as number);
+    const value = (at: number[]) => ((at[0] as number) * 7 + (at[1] as number) * 11 + (at[2] as number) * 13) % 251;
+    const chunk = new Uint8Array(33 * 20 * 50);
+    for (let i = 0; i < chunk.length; i++) {
+      const [, b, c] = stored as [number, number, number];
+      const along = [Math.floor(i / (b * c)), Math.floor(i / c) % b, i % c];
+      const at = [0, 0, 0];
+      order.forEach((axis, k) => {
+        at[axis] = along[k] as number;
+      });
+      chunk[i] = value(at);
+    }
+    const zarr = await openZarr(withChunk({ shape, chunks: shape, order }, chunk));
+    const region = await zarr.region(0, { min: [0, 0, 0], max: [50, 20, 33] });
+    const expected = Array.from(chunk, (_, i) => value([Math.floor(i / (nx * ny)), Math.floor(i / nx) % ny, i % nx]));
+    expect([...region.intensities()]).toEqual(expected);
+    zarr.free();
+  });
+
+  test('are read in slices, between which an abort takes effect', async () => {
+    const side = 256;
+    const given = { shape: [side, side, side], chunks: [side, side, side], order: [2, 1, 0] };
+    const store = withChunk(given, new Uint8Array(side ** 3));
+    let [turns, isOver] = [0, false];
+    const count = () => {
+      turns += 1;
+      if (!isOver) setImmediate(count);
+    };
+    const opened = openZarr(store).then((zarr) => zarr.region(0, { min: [0, 0, 0], max: [9, 9, 9] }).then(() => zarr));
+    count();
+    const zarr = await opened;
+    isOver = true;
+    expect(turns).toBeGreaterThan(3);
+    zarr.free();
+  });
+});
 
 describe('decoders stop at the size of a chunk', () => {
   const codec = (name: string) => ({ name, configuration: { level: 5, cname: 'lz4', clevel: 5, shuffle: 0 } });
