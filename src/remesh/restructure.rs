@@ -410,7 +410,9 @@ pub async fn split_long(
     for _ in 0..PASSES {
         let before = changes.creations;
         let mut long: Vec<_> = long_edges(mesh, bounds).collect();
+        pauses.now().await;
         sort_by_rank(&mut long, |&(_, (u, v))| combined_rank(u.0, v.0));
+        pauses.now().await;
         sort_by_rank(&mut long, |&(square, _)| (!rank_f32(square)).into());
         pauses.now().await;
         for some in long.chunks(CHUNK) {

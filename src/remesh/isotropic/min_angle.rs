@@ -22,6 +22,10 @@ const MOVES: usize = 4;
 /// The highest valence after a flip: with eleven neighbours one angle must be below 33°.
 const MAX_VALENCE: usize = 10;
 
+/// The highest valence of a vertex that is collapsed or moved: with more neighbours its angles are small wherever it is, and
+/// each attempt looks at all of them for each of them.
+const MOST_NEIGHBOURS: usize = 64;
+
 /// Improves triangle angles below 33° by flips, collapses and moves that keep edge lengths within bounds or bring them
 /// nearer to them; returns the numbers of edits. Pauses meanwhile.
 pub(super) async fn improve_angles<E: EditPolicy>(
@@ -56,8 +60,8 @@ pub(super) async fn improve_angles<E: EditPolicy>(
     changes
 }
 
-/// Tries to improve the angles at `v` below 33°: by flips, then by a collapse of `v`, then by moves of it; `ring`
-/// contains its neighbours before the edits. Returns the numbers of edits; moves are not counted.
+/// Tries to improve the angles at `v` below 33°: by flips, then by a collapse of `v`, then by moves of it, if it has at most
+/// [`MOST_NEIGHBOURS`]; `ring` contains its neighbours before the edits. Returns the numbers of edits; moves are not counted.
 fn improve_around<E: EditPolicy>(
     mesh: &mut Mesh,
     bounds: EdgeBounds,
@@ -70,7 +74,7 @@ fn improve_around<E: EditPolicy>(
         changes.inversions += u32::from(flip(mesh, bounds, [v, w], session));
     }
     let now = min_quality(mesh, v);
-    if now >= POOR {
+    if now >= POOR || mesh.ring(v).valence() > MOST_NEIGHBOURS {
         return changes;
     }
     for &w in ring {
