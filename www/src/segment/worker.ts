@@ -57,7 +57,13 @@ class LiveMap {
       this.map.free();
       throw error;
     }
-    for (const label of voxels) this.#count(label, 1);
+    this.#countAll(voxels);
+  }
+
+  /** Returns a copy of the labels; one of background alone takes no memory until it is written to. */
+  copy(): LabelArray {
+    if (this.#counts.get(0) !== this.voxels.length) return this.voxels.slice();
+    return new (this.voxels.constructor as new (length: number) => LabelArray)(this.voxels.length);
   }
 
   /** Labels whose surfaces have changed since they were last sent; also those that have lost all voxels. */
@@ -108,6 +114,14 @@ class LiveMap {
     return { ...arrays, vertices, triangles, origin: mesh.origin };
   }
 
+  #countAll(voxels: LabelArray): void {
+    for (let first = 0, end = 0; first < voxels.length; first = end) {
+      const label = voxels[first] ?? 0;
+      while (end < voxels.length && voxels[end] === label) end += 1;
+      this.#count(label, end - first);
+    }
+  }
+
   #count(label: number, change: number): void {
     this.#counts.set(label, (this.#counts.get(label) ?? 0) + change);
   }
@@ -147,9 +161,9 @@ class Session {
       const live = new LiveMap(opened, labels ?? opened.map.voxels, opened.map.warnings, params, known);
       this.#adopt(live);
       this.#open?.volume.free();
-      this.#open = opened;
+      this.#open = { volume: opened.volume, unit: opened.unit };
       const all = this.#all(live, opened.map, began);
-      const volume = { ...viewOf(opened.volume, name), ...displayOf(source) };
+      const volume = { ...viewOf(opened.volume, name, opened.voxels), ...displayOf(source) };
       const { looksLike } = opened;
       return withTransfer({ ...all, volume, looksLike, params: { ...live.surfaces.params } }, [
         ...arraysOf(all),
@@ -192,7 +206,7 @@ class Session {
   #all(live: LiveMap, { known, file }: OpenMap, began: number): OpenedLabels {
     const update = this.#update(live.surfaces.labels, began);
     const { warnings } = live.map;
-    return { ...update, map: live.id, voxels: live.voxels.slice(), known, labelFile: file, warnings };
+    return { ...update, map: live.id, voxels: live.copy(), known, labelFile: file, warnings };
   }
 
   #update(labels: Iterable<number>, began: number): SurfaceUpdate {

@@ -223,7 +223,8 @@ class Session {
     try {
       await tracker.run({ signal, onStep: (report) => this.#stepped(report) });
     } catch (error) {
-      if (!signal.aborted) send({ event: 'failure', failure: toFailure(inWords(error)) });
+      // After the state event, so that the page shows the failure on top of that state.
+      if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: toFailure(inWords(error)) }));
     }
     this.#reportStopped();
   }

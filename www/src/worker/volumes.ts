@@ -105,7 +105,10 @@ export async function openFrame(source: VolumeSource, frame: number): Promise<Op
 }
 
 /** Returns voxels that are what {@link intensitiesOf} would make of their volume, which saves a copy; otherwise undefined. */
-function displayed({ data, slope = 1, intercept = 0 }: VolumeInit, range: [number, number]): Intensities | undefined {
+export function displayed(
+  { data, slope = 1, intercept = 0 }: VolumeInit,
+  range: [number, number],
+): Intensities | undefined {
   const narrow = narrowArray(range, 0);
   const isSame = slope === 1 && intercept === 0 && data.constructor === narrow?.constructor;
   // Of a longer buffer, a part cannot be given away.
@@ -184,15 +187,30 @@ export function viewOf(volume: Volume, name: string, voxels = intensitiesOf(volu
  * and white.
  */
 export function levelsOf(volume: Volume, levels: number, window: [number, number]): LevelView[] {
+  const isInteger = narrowArray(volume.range, 0) !== undefined;
   const [same, ...coarser] = volume.pyramid(levels + 1);
   same?.free();
   return coarser.map((level) => {
     try {
-      return { dims: level.dims, voxels: intensitiesOf(level), window };
+      // Means of integers are none, but need no more steps than these have: half the memory is enough.
+      return { dims: level.dims, window, ...(isInteger ? inSteps(level) : { voxels: intensitiesOf(level) }) };
     } finally {
       level.free();
     }
   });
+}
+
+/** Returns the intensities of a volume in 65,536 steps. */
+export function inSteps(volume: Volume): Required<Pick<LevelView, 'voxels' | 'scale'>> {
+  const [nx, ny, nz] = volume.dims;
+  const [low, high] = volume.range;
+  const step = (high - low) / 0xffff || 1;
+  const voxels = new Uint16Array(nx * ny * nz);
+  for (let z = 0; z < nz; z++) {
+    const values = volume.slice(2, z);
+    for (let i = 0; i < values.length; i++) voxels[z * nx * ny + i] = Math.round(((values[i] ?? 0) - low) / step);
+  }
+  return { voxels, scale: [step, low] };
 }
 
 /** Returns the intensities of the first `frames` frames in the narrowest type that holds all of them exactly. */
