@@ -136,9 +136,8 @@ class Session {
     await this.#pause();
     const { name, source, setup, frame, saved, isSmall = false } = body;
     if ('zarr' in source) return this.#loadLarge(source, body, signal);
-    const { volume, frames, unit, voxels } = await openFrame(source, frame);
+    const { volume, frames, unit, voxels } = await openFrame(source, frame, isSmall);
     try {
-      if (isSmall) checkPlanes(volume);
       const view: VolumeView = { ...viewOf(volume, name, voxels), ...displayOf(source), frames, ...(unit && { unit }) };
       const fitting = fittingSetup(setup, volume);
       const model = saved ? restoredModel(volume, saved, isSmall) : buildModel(volume, fitting, isSmall);

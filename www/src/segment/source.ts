@@ -7,7 +7,7 @@ import { invert, toWorld } from '../view/anatomy';
 import { merged, type Warning } from '../warnings';
 import { groupFiles } from '../worker/file-groups';
 import { Refusal } from '../worker/refusal';
-import { displayed, readFiles } from '../worker/volumes';
+import { checkSmall, displayed, readFiles } from '../worker/volumes';
 import { labelHead, labelTooth } from './labelling';
 import type { KnownLabel } from './labels';
 import { labelsLike } from './likeness';
@@ -50,8 +50,9 @@ export interface OpenVolume {
  * Opens a volume with its label map, which is that of a second file, computed, or empty. With several frames, the first
  * one of the label map is used. A DICOM segmentation alone is both.
  */
-export async function openImage({ files, labelling }: ImageSource): Promise<OpenVolume> {
+export async function openImage({ files, labelling }: ImageSource, isSmall = false): Promise<OpenVolume> {
   const { image, map, looksLike } = await readBoth(files);
+  if (isSmall) checkSmall(image.init);
   const volume = new Volume(image.init);
   try {
     const labels = map ? labelsOf(map, volume) : computed(volume, labelling);

@@ -3,7 +3,7 @@ import { type LengthUnit, VesicleError, Volume, type VolumeInit } from 'vesicle'
 import startReaders, { parseVolume } from 'vesicle/import';
 import type { FileNotes, Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
 import { shapeVoxels } from '../shapes';
-import { SMALL } from '../small-files';
+import { MOST_VOXELS_OF_SMALL, SMALL } from '../small-files';
 import { text } from '../texts';
 import { quantiles } from '../threshold';
 import { concerning, type Warning } from '../warnings';
@@ -88,12 +88,25 @@ export function checkPlanes({ dims }: Pick<Volume, 'dims'>): void {
   );
 }
 
+/** Throws a `Refusal` if an image in small files has too many voxels, or planes with too many pixels, to be shown. */
+export function checkSmall({ dims: [x, y, z, frames = 1] }: Pick<VolumeInit, 'dims'>): void {
+  checkPlanes({ dims: [x, y, z] });
+  const voxels = x * y * z * frames;
+  if (voxels <= MOST_VOXELS_OF_SMALL) return;
+  const [most, given] = [MOST_VOXELS_OF_SMALL, voxels].map((count) => Math.round(count / 1e6));
+  throw new Refusal(
+    'too-large',
+    text('files.tooManyVoxels', { millions: given as number, kilobytes: SMALL / 2 ** 10, most: most as number }),
+  );
+}
+
 /**
  * Returns a frame of the computed volume of a shape, or of one in files of any supported format, the library's own or
  * one that other libraries read.
  */
-export async function openFrame(source: VolumeSource, frame: number): Promise<OpenFrame> {
+export async function openFrame(source: VolumeSource, frame: number, isSmall = false): Promise<OpenFrame> {
   const { frameSeconds: _, warnings = [], ...init } = await read(source);
+  if (isSmall) checkSmall(init);
   const [x, y, z, frames = 1] = init.dims;
   if (!Number.isInteger(frame) || frame < 0 || frame >= frames)
     throw new Refusal('invalid-argument', text('slices.noFrame', { last: frames - 1, frame }));
