@@ -7,7 +7,7 @@ import { invert, toWorld } from '../view/anatomy';
 import { merged, type Warning } from '../warnings';
 import { groupFiles } from '../worker/file-groups';
 import { Refusal } from '../worker/refusal';
-import { checkSmall, displayed, readFiles } from '../worker/volumes';
+import { checkSmallImage, displayed, readFiles } from '../worker/volumes';
 import { labelHead, labelTooth } from './labelling';
 import type { KnownLabel } from './labels';
 import { labelsLike } from './likeness';
@@ -52,7 +52,7 @@ export interface OpenVolume {
  */
 export async function openImage({ files, labelling }: ImageSource, isSmall = false): Promise<OpenVolume> {
   const { image, map, looksLike } = await readBoth(files);
-  if (isSmall) checkSmall(image.init);
+  if (isSmall) checkSmallImage(image.init);
   const volume = new Volume(image.init);
   try {
     const labels = map ? labelsOf(map, volume) : computed(volume, labelling);

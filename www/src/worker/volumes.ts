@@ -89,7 +89,7 @@ export function checkPlanes({ dims }: Pick<Volume, 'dims'>): void {
 }
 
 /** Throws a `Refusal` if an image in small files has too many voxels, or planes with too many pixels, to be shown. */
-export function checkSmall({ dims: [x, y, z, frames = 1] }: Pick<VolumeInit, 'dims'>): void {
+export function checkSmallImage({ dims: [x, y, z, frames = 1] }: Pick<VolumeInit, 'dims'>): void {
   checkPlanes({ dims: [x, y, z] });
   const voxels = x * y * z * frames;
   if (voxels <= MOST_VOXELS_OF_SMALL) return;
@@ -106,7 +106,7 @@ export function checkSmall({ dims: [x, y, z, frames = 1] }: Pick<VolumeInit, 'di
  */
 export async function openFrame(source: VolumeSource, frame: number, isSmall = false): Promise<OpenFrame> {
   const { frameSeconds: _, warnings = [], ...init } = await read(source);
-  if (isSmall) checkSmall(init);
+  if (isSmall) checkSmallImage(init);
   const [x, y, z, frames = 1] = init.dims;
   if (!Number.isInteger(frame) || frame < 0 || frame >= frames)
     throw new Refusal('invalid-argument', text('slices.noFrame', { last: frames - 1, frame }));
