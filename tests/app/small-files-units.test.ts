@@ -2,7 +2,7 @@
 import { expect, test } from 'vitest';
 import type { Session } from '../../www/src/session/schema';
 import { isOfSmall, SMALL } from '../../www/src/small-files';
-import { checkPlanes } from '../../www/src/worker/volumes';
+import { checkPlanes, checkSmallImage } from '../../www/src/worker/volumes';
 
 type Dims = [number, number, number];
 
@@ -27,4 +27,12 @@ test('planes through an image in small files have at most four million pixels', 
   const [flat, upright, across] = [[9400, 9400, 1] as Dims, [1, 9400, 9400] as Dims, [9400, 1, 9400] as Dims];
   for (const dims of [flat, upright, across]) expect(() => checkPlanes({ dims })).toThrow(message);
   for (const dims of [[2048, 2048, 23] as Dims, [100_000, 30, 30] as Dims]) checkPlanes({ dims });
+});
+
+test('images in small files have at most 67 million voxels, all frames together', () => {
+  for (const dims of [[464, 464, 464] as Dims, [256, 256, 256, 5] as [...Dims, number]])
+    expect(() => checkSmallImage({ dims })).toThrow(
+      /million voxels; one in files of at most 128 KiB may have 67 million/,
+    );
+  for (const dims of [[512, 512, 256] as Dims, [256, 256, 256, 4] as [...Dims, number]]) checkSmallImage({ dims });
 });

@@ -62,12 +62,31 @@ function takeWorker(spawn: () => Worker): Worker {
   return worker;
 }
 
+const LOCK = 'vesicle worker';
+/** Most milliseconds to wait for a worker to end; browsers end a busy one after about two seconds. */
+const ENDING_MS = 5000;
+
+/**
+ * Resolves when nobody holds a lock any more: that of a terminated worker, whose memory is given back then. Does not
+ * wait in a page that has no locks since it came without encryption.
+ */
+async function released(lock: string): Promise<void> {
+  const signal = AbortSignal.timeout(ENDING_MS);
+  await navigator.locks?.request(lock, { signal }, () => undefined).catch(() => undefined);
+}
+
 /** The page's connection to a lab's worker: requests return promises, events go to one listener. */
 export class Channel<Requests extends RequestTable<Requests>, Event extends { event: string }> {
   readonly #spawn: () => Worker;
   readonly #onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void;
   readonly #pending = new Map<number, PendingRequest>();
-  #worker: Worker;
+  /** The worker; undefined until the one before has ended. */
+  #worker: Worker | undefined;
+  /** Name of the lock that the worker holds until it has ended. */
+  #lock = '';
+  /** Messages that wait for the worker. */
+  #unsent: [message: object, transfer: Transferable[]][] = [];
+  #isClosed = false;
   /** Failure that broke the worker, if any; every request is rejected with it until the worker is restarted. */
   #failure: Failure | undefined;
   #lastId = 0;
@@ -75,7 +94,7 @@ export class Channel<Requests extends RequestTable<Requests>, Event extends { ev
   constructor(spawn: () => Worker, onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void) {
     this.#spawn = spawn;
     this.#onEvent = onEvent;
-    this.#worker = this.#start();
+    this.#start();
   }
 
   request<K extends keyof Requests>(
@@ -87,13 +106,14 @@ export class Channel<Requests extends RequestTable<Requests>, Event extends { ev
     const id = ++this.#lastId;
     return new Promise((resolve, reject) => {
       this.#pending.set(id, { resolve, reject });
-      this.#worker.postMessage({ id, kind, body }, transfer);
+      this.post({ id, kind, body } as { kind: string }, transfer);
     });
   }
 
   /** Posts a message that has no reply to the worker. */
   protected post(message: { kind: string }, transfer: Transferable[] = []): void {
-    this.#worker.postMessage(message, transfer);
+    if (this.#worker) this.#worker.postMessage(message, transfer);
+    else this.#unsent.push([message, transfer]);
   }
 
   /**
@@ -101,20 +121,30 @@ export class Channel<Requests extends RequestTable<Requests>, Event extends { ev
    * rejected with `failure`.
    */
   restart(failure: Failure): void {
-    this.#worker.terminate();
     this.#fail(failure);
     this.#failure = undefined;
-    this.#worker = this.#start();
+    this.#unsent = [];
+    // The one before, which has not ended, is waited for already.
+    if (!this.#worker) return;
+    this.#worker.terminate();
+    this.#worker = undefined;
+    void released(this.#lock).then(() => this.#isClosed || this.#start());
   }
 
   /** Terminates the worker and frees its memory. Pending requests are never settled, since the lab is being closed. */
   close(): void {
-    this.#worker.terminate();
+    this.#worker?.terminate();
+    this.#isClosed = true;
     this.#pending.clear();
   }
 
-  #start(): Worker {
+  #start(): void {
     const worker = takeWorker(this.#spawn);
+    this.#worker = worker;
+    this.#lock = `${LOCK} ${Math.random()}`;
+    worker.postMessage({ id: 0, kind: 'hold', body: this.#lock });
+    for (const [message, transfer] of this.#unsent) worker.postMessage(message, transfer);
+    this.#unsent = [];
     worker.onmessage = ({ data }: MessageEvent<Reply | Event>) => this.#receive(data);
     worker.onerror = (event) => {
       // The page shows the error; the console need not repeat it.
@@ -122,7 +152,6 @@ export class Channel<Requests extends RequestTable<Requests>, Event extends { ev
       this.#broken(event.message || text('shell.workerFailed'));
     };
     worker.onmessageerror = () => this.#broken(text('shell.messageUnreadable'));
-    return worker;
   }
 
   #receive(message: Reply | Event): void {
@@ -141,7 +170,7 @@ export class Channel<Requests extends RequestTable<Requests>, Event extends { ev
     const failure: Failure = { code: 'internal', message };
     this.#failure = failure;
     // Its further results could not be trusted.
-    this.#worker.terminate();
+    this.#worker?.terminate();
     this.#fail(failure);
     this.#onEvent({ event: 'failure', failure });
   }

@@ -107,6 +107,8 @@ export interface LevelView {
   window: [number, number];
   /** Whether small intensities are displayed bright instead. */
   inverted?: boolean;
+  /** Slope and intercept of the map from `voxels` to intensities; without them, these are the same. */
+  scale?: readonly [slope: number, intercept: number];
 }
 
 /** A quantity computed at each vertex to colour the surface by; the names appear in the interface. */
@@ -278,6 +280,8 @@ export interface Requests extends CodeRequests {
       setup: Setup;
       frame: number;
       saved?: SavedRun | undefined;
+      /** Whether the page shows the voxels already, which are then not sent. */
+      isShown?: boolean;
       /** Whether the image is in small files, or in a small session. */
       isSmall?: boolean;
     };

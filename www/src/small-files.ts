@@ -5,9 +5,12 @@ import type { Session } from './session/schema';
 /** Bytes of files that are small, all together. */
 export const SMALL = 2 ** 17;
 
+/** Most voxels of an image of small files, with slices between its own: the page and its worker have some copies of them. */
+export const MOST_VOXELS_OF_SMALL = 2 ** 26;
+
 /** Limits of what the labs make of small data; with more, the page takes over a gigabyte. */
 export const EXTRACT_OF_SMALL = { maxVertices: 300_000 };
-export const SEGMENT_OF_SMALL = { maxVertices: 500_000 };
+export const SEGMENT_OF_SMALL = { maxVertices: 200_000 };
 export const TRACK_OF_SMALL = { maxVertices: 200_000, maxVoxels: 8_000_000 };
 
 /** Returns whether data are in small files, or in a small session, which has them. */

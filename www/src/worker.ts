@@ -1,11 +1,13 @@
 /** Worker of the Extract lab: holds one volume and one model, and serves the page's requests. */
 
 import type { DeformableModel, Mesh, StepReport, Volume } from 'vesicle';
+import { release } from './memory';
 import type {
   Attractor,
   CodeRequest,
   DataEvent,
   ExportRequest,
+  Failure,
   LargeSource,
   LevelView,
   Loaded,
@@ -134,9 +136,8 @@ class Session {
     await this.#pause();
     const { name, source, setup, frame, saved, isSmall = false } = body;
     if ('zarr' in source) return this.#loadLarge(source, body, signal);
-    const { volume, frames, unit, voxels } = await openFrame(source, frame);
+    const { volume, frames, unit, voxels } = await openFrame(source, frame, isSmall);
     try {
-      if (isSmall) checkPlanes(volume);
       const view: VolumeView = { ...viewOf(volume, name, voxels), ...displayOf(source), frames, ...(unit && { unit }) };
       const fitting = fittingSetup(setup, volume);
       const model = saved ? restoredModel(volume, saved, isSmall) : buildModel(volume, fitting, isSmall);
@@ -151,6 +152,10 @@ class Session {
       const [file, second] = 'files' in source ? source.files : [];
       // Of images of other programs it is known what they are.
       const labels = file && !second && !file.notes ? labelsLike(view.voxels) : 0;
+      if (body.isShown) {
+        release(view.voxels);
+        view.voxels = new Uint8Array();
+      }
       return withTransfer({ ...ready, volume: view, levels: fitting.levels, labels }, [view.voxels]);
     } catch (error) {
       volume.free();
@@ -234,6 +239,7 @@ class Session {
   }
 
   async #runToEnd(model: DeformableModel, signal: AbortSignal, maxIterations: number): Promise<void> {
+    let failure: Failure | undefined;
     try {
       await model.run({
         signal,
@@ -242,11 +248,12 @@ class Session {
         onData: (data) => this.#received(data),
       });
     } catch (error) {
-      if (!signal.aborted) send({ event: 'failure', failure: toFailure(error) });
+      if (!signal.aborted) failure = toFailure(error);
     }
     // Nothing is read any more, whatever was to come.
     if (this.#data) send({ event: 'data', ...this.#data, waiting: 0 });
-    this.#reportStopped();
+    if (failure) this.#reportFailed(failure);
+    else this.#reportStopped();
   }
 
   #received(data: Omit<DataEvent, 'event'>): void {
@@ -299,6 +306,14 @@ class Session {
   #reportStopped(): void {
     this.#snapshot('checked');
     send({ event: 'state', state: this.#done ? 'done' : 'paused' });
+  }
+
+  /** Reports a run that failed: first that it has stopped, since the page shows a failure on top of that, and checks last. */
+  #reportFailed(failure: Failure): void {
+    this.#snapshot('plain');
+    send({ event: 'state', state: 'paused' });
+    send({ event: 'failure', failure });
+    this.#snapshot('checked');
   }
 
   #setParams(params: ParamValues): ParamValues {

@@ -126,7 +126,15 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     const choice = page?.choice ?? (reopening ? this.#ui.start.inForce : this.#startFor(source, volume));
     const setup = reopening || page ? this.#settings.setup(choice) : this.#setupFor(source, volume, choice);
     const isSmall = isOfSmall(source.session, storedIn(volume));
-    const body = { name: source.name, source: volume, setup, frame: frameOf(source), saved, isSmall };
+    const body = {
+      name: source.name,
+      source: volume,
+      setup,
+      frame: frameOf(source),
+      saved,
+      isSmall,
+      isShown: reopening,
+    };
     const loaded = await this.#client.request('load', body, transferable(volume));
     return { ...loaded, choice: { ...choice, levels: loaded.levels }, setup, moments };
   }

@@ -1,12 +1,13 @@
 /** Opens volumes and label maps. Used by the worker only. */
 
 import { type LengthUnit, Volume, type VolumeInit } from 'vesicle';
+import type { Intensities } from '../protocol';
 import { text } from '../texts';
 import { invert, toWorld } from '../view/anatomy';
 import { merged, type Warning } from '../warnings';
 import { groupFiles } from '../worker/file-groups';
 import { Refusal } from '../worker/refusal';
-import { readFiles } from '../worker/volumes';
+import { checkSmallImage, displayed, readFiles } from '../worker/volumes';
 import { labelHead, labelTooth } from './labelling';
 import type { KnownLabel } from './labels';
 import { labelsLike } from './likeness';
@@ -41,18 +42,22 @@ export interface OpenVolume {
   unit: LengthUnit | undefined;
   /** Number of labels, if the volume looks like a label map, which it then is, too, unless it has one label; else 0. */
   looksLike: number;
+  /** The voxels as they were read, where these are the intensities that the page displays. */
+  voxels: Intensities | undefined;
 }
 
 /**
  * Opens a volume with its label map, which is that of a second file, computed, or empty. With several frames, the first
  * one of the label map is used. A DICOM segmentation alone is both.
  */
-export async function openImage({ files, labelling }: ImageSource): Promise<OpenVolume> {
+export async function openImage({ files, labelling }: ImageSource, isSmall = false): Promise<OpenVolume> {
   const { image, map, looksLike } = await readBoth(files);
+  if (isSmall) checkSmallImage(image.init);
   const volume = new Volume(image.init);
   try {
     const labels = map ? labelsOf(map, volume) : computed(volume, labelling);
-    return { volume, map: labels, unit: image.init.unit, looksLike };
+    const voxels = volume.frames === 1 ? displayed(image.init, volume.range) : undefined;
+    return { volume, map: labels, unit: image.init.unit, looksLike, voxels };
   } catch (error) {
     volume.free();
     throw error;

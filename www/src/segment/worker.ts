@@ -9,7 +9,7 @@ import { Refusal } from '../worker/refusal';
 import { type Handlers, serve, withTransfer } from '../worker/serving';
 import { capacityFor } from '../worker/surface-buffers';
 import { triangleArea } from '../worker/triangle-area';
-import { checkPlanes, displayOf, fitsNifti, viewOf } from '../worker/volumes';
+import { displayOf, fitsNifti, viewOf } from '../worker/volumes';
 import type {
   LabelArray,
   LabelBlock,
@@ -17,6 +17,7 @@ import type {
   OpenedImage,
   OpenedLabels,
   ParamValues,
+  Region,
   Requests,
   StepUpdate,
   Surface,
@@ -28,11 +29,17 @@ import { mapLike, type OpenMap, type OpenVolume, openImage, openLabels } from '.
 
 let maps = 0;
 
+/** Voxels beyond which the labels of a map are not kept a second time: before a change, they are read from the map. */
+const MOST_KEPT = 2 ** 24;
+/** Largest label that is read from a map exactly. */
+const LARGEST_READ = 2 ** 24;
+
 /** A label map with its surfaces. */
 class LiveMap {
   readonly id = ++maps;
   readonly map: Volume;
-  readonly voxels: LabelArray;
+  /** The labels; undefined if they are read from the map. */
+  readonly #voxels: LabelArray | undefined;
   readonly surfaces: LabelSurfaces;
   /** Number of voxels of each label, the background included. */
   readonly #counts = new Map<number, number>();
@@ -47,7 +54,6 @@ class LiveMap {
     params: ParamValues,
     { isSmall = false, state }: { isSmall?: boolean | undefined; state?: Uint8Array | undefined },
   ) {
-    this.voxels = voxels;
     this.map = mapLike(image, voxels, warnings);
     this.#voxelVolume = Math.abs(determinant(image.volume.affine));
     try {
@@ -57,7 +63,14 @@ class LiveMap {
       this.map.free();
       throw error;
     }
-    for (const label of voxels) this.#count(label, 1);
+    this.#countAll(voxels);
+    const largest = Math.max(...Array.from(this.#counts.keys(), Math.abs));
+    if (voxels.length <= MOST_KEPT || largest > LARGEST_READ) this.#voxels = voxels;
+  }
+
+  /** Returns the labels, which the map was made of, for the page: a copy if they are kept here, too. */
+  forPage(voxels: LabelArray): LabelArray {
+    return this.#voxels ? voxels.slice() : voxels;
   }
 
   /** Labels whose surfaces have changed since they were last sent; also those that have lost all voxels. */
@@ -68,17 +81,16 @@ class LiveMap {
 
   /** Changes voxels; the surfaces follow them by the next steps. */
   write(block: LabelBlock): void {
+    const { min, dims } = block;
+    this.#countRows(block, -1);
     this.map.write(block);
     let at = 0;
     forEachRow(block, this.map.dims, (first) => {
-      for (let x = 0; x < block.dims[0]; x++) {
-        const label = block.data[at++] ?? 0;
-        this.#count(this.voxels[first + x] ?? 0, -1);
-        this.#count(label, 1);
-        this.voxels[first + x] = label;
-      }
+      const row = block.data.subarray(at, at + dims[0]);
+      this.#voxels?.set(row, first);
+      for (const label of row) this.#count(label, 1);
+      at += dims[0];
     });
-    const { min, dims } = block;
     this.surfaces.refresh({ min, dims });
   }
 
@@ -106,6 +118,26 @@ class LiveMap {
     };
     mesh.copyTo(arrays, { relative: true });
     return { ...arrays, vertices, triangles, origin: mesh.origin };
+  }
+
+  /** Counts the present labels of a box, each as `change`. */
+  #countRows(box: Region, change: number): void {
+    const [nx, ny] = this.map.dims;
+    let [plane, read] = [-1, new Float32Array() as ArrayLike<number>];
+    forEachRow(box, this.map.dims, (first) => {
+      const z = Math.floor(first / (nx * ny));
+      if (z !== plane && !this.#voxels) [plane, read] = [z, this.map.slice(2, z)];
+      const [labels, start] = this.#voxels ? [this.#voxels, first] : [read, first - z * nx * ny];
+      for (let i = start; i < start + box.dims[0]; i++) this.#count(labels[i] ?? 0, change);
+    });
+  }
+
+  #countAll(voxels: LabelArray): void {
+    for (let first = 0, end = 0; first < voxels.length; first = end) {
+      const label = voxels[first] ?? 0;
+      while (end < voxels.length && voxels[end] === label) end += 1;
+      this.#count(label, end - first);
+    }
   }
 
   #count(label: number, change: number): void {
@@ -140,16 +172,16 @@ class Session {
 
   async #openImage({ name, source, params, labels, ...session }: Requests['open']['body']): Promise<OpenedImage> {
     const began = performance.now();
-    const opened = await openImage(source);
+    const known = { isSmall: !labels && areSmall(source.files), ...session };
+    const opened = await openImage(source, known.isSmall);
     try {
-      const known = { isSmall: !labels && areSmall(source.files), ...session };
-      if (known.isSmall) checkPlanes(opened.volume);
-      const live = new LiveMap(opened, labels ?? opened.map.voxels, opened.map.warnings, params, known);
+      const voxels = labels ?? opened.map.voxels;
+      const live = new LiveMap(opened, voxels, opened.map.warnings, params, known);
       this.#adopt(live);
       this.#open?.volume.free();
-      this.#open = opened;
-      const all = this.#all(live, opened.map, began);
-      const volume = { ...viewOf(opened.volume, name), ...displayOf(source) };
+      this.#open = { volume: opened.volume, unit: opened.unit };
+      const all = this.#all(live, { ...opened.map, voxels }, began);
+      const volume = { ...viewOf(opened.volume, name, opened.voxels), ...displayOf(source) };
       const { looksLike } = opened;
       return withTransfer({ ...all, volume, looksLike, params: { ...live.surfaces.params } }, [
         ...arraysOf(all),
@@ -189,10 +221,10 @@ class Session {
     this.#live = live;
   }
 
-  #all(live: LiveMap, { known, file }: OpenMap, began: number): OpenedLabels {
+  #all(live: LiveMap, { voxels, known, file }: OpenMap, began: number): OpenedLabels {
     const update = this.#update(live.surfaces.labels, began);
     const { warnings } = live.map;
-    return { ...update, map: live.id, voxels: live.voxels.slice(), known, labelFile: file, warnings };
+    return { ...update, map: live.id, voxels: live.forPage(voxels), known, labelFile: file, warnings };
   }
 
   #update(labels: Iterable<number>, began: number): SurfaceUpdate {

@@ -2,7 +2,7 @@
  * Sessions as files: a ZIP with `session.json` and binary parts; `docs/sessions.md` describes the format. Nothing of a file
  * is used before it is checked, since it may come from anywhere.
  */
-import { strFromU8, strToU8, type Zippable, zipSync } from 'three/addons/libs/fflate.module.js';
+import { strFromU8, strToU8 } from 'three/addons/libs/fflate.module.js';
 import { ArchiveTooLarge, MOST_FILES, unpack } from '../archive';
 import type { FileNotes, NamedBytes } from '../protocol';
 import { SMALL } from '../small-files';
@@ -10,6 +10,7 @@ import { text } from '../texts';
 import { decode, encode, type Parts } from './codec';
 import { INDEX } from './recognise';
 import { checked, type Session, shown } from './schema';
+import { zipped } from './zip';
 
 const FORMAT = 'vesicle-session';
 /** Version of the format that is written; older ones are read. */
@@ -73,17 +74,19 @@ export function describe(files: NamedBytes[], included: boolean): Promise<Source
 export async function writeSession({ lab, hash, source, content }: NewSession): Promise<Uint8Array> {
   const parts: Parts = {};
   const body = encode({ lab, hash, source, ...content }, parts) as object;
-  const sums = Object.entries(parts).map(async ([name, part]) => [name, await sha256(part)] as const);
-  const index = { format: FORMAT, version: VERSION, ...body, parts: Object.fromEntries(await Promise.all(sums)) };
-  const packed = strToU8(JSON.stringify(index));
+  const sums: Record<string, string> = {};
+  // One by one, since the browser copies what it computes them of.
+  for (const [name, part] of Object.entries(parts)) sums[name] = await sha256(part);
+  const packed = strToU8(JSON.stringify({ format: FORMAT, version: VERSION, ...body, parts: sums }));
   requireSize(packed, MOST_INDEX);
-  const files: Zippable = { [INDEX]: packed };
-  // Most data are compressed already.
-  for (const [name, part] of Object.entries(parts)) files[name] = [part, { level: name.startsWith('source/') ? 0 : 1 }];
-  const archive = zipSync(files);
+  const files = Object.entries(parts).map(([name, bytes]) => {
+    // Most data are compressed already.
+    return { name, bytes, compressed: !name.startsWith('source/') };
+  });
+  const archive = await zipped([{ name: INDEX, bytes: packed, compressed: true }, ...files]);
   if (packed.length <= mostIndex(archive)) return archive;
-  // One that repeats itself so much is not packed, so that it can be read.
-  return zipSync({ ...files, [INDEX]: [packed, { level: 0 }] });
+  // One that repeats itself so much is not compressed, so that it can be read.
+  return zipped([{ name: INDEX, bytes: packed, compressed: false }, ...files]);
 }
 
 /** Returns the largest size of the `session.json` in a file: a small file could unpack to a thousand times its size. */

@@ -1,7 +1,7 @@
 /** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
 
 import { SurfaceTracker, VesicleError, Volume } from 'vesicle';
-import { SMALL, TRACK_OF_SMALL } from '../small-files';
+import { MOST_VOXELS_OF_SMALL, SMALL, TRACK_OF_SMALL } from '../small-files';
 import { text } from '../texts';
 import { invert } from '../view/anatomy';
 import { groupFiles } from '../worker/file-groups';
@@ -52,8 +52,6 @@ export function inWords(error: unknown): unknown {
   return isTooLarge ? new Refusal(error.code, text('track.tooLarge')) : error;
 }
 
-/** The most voxels that an image of small files may have, with slices between its own. */
-const MOST_OF_SMALL = 2 ** 26;
 /** The largest factor by which the library multiplies slices. */
 const MOST_SLICES = 16;
 
@@ -67,14 +65,14 @@ export function checkSmall(
   const factor =
     preparation.factor || Math.min(MOST_SLICES, Math.max(1, Math.round(thickest / ((finest + middle) / 2))));
   const voxels = (dims[0] * dims[1] * dims[2] * frames * factor) / preparation.binning ** 2;
-  if (voxels <= MOST_OF_SMALL) return;
+  if (voxels <= MOST_VOXELS_OF_SMALL) return;
   const millions = (count: number) => Math.round(count / 1e6);
   throw new Refusal(
     'too-large',
     text('track.smallTooLarge', {
       millions: millions(voxels),
       kilobytes: SMALL / 2 ** 10,
-      most: millions(MOST_OF_SMALL),
+      most: millions(MOST_VOXELS_OF_SMALL),
     }),
   );
 }

@@ -8,7 +8,7 @@ import { Refusal, toFailure } from '../worker/refusal';
 import { logged, type RunLog, RunRecorder } from '../worker/run-log';
 import { type Handlers, sender, serve, Work, withTransfer } from '../worker/serving';
 import { transferOf } from '../worker/surface-buffers';
-import { checkPlanes, displayOf, intensitiesOf, viewOf } from '../worker/volumes';
+import { checkSmallImage, displayOf, intensitiesOf, viewOf } from '../worker/volumes';
 import { type CineSpec, trueVolume } from './cine';
 import { programOf } from './code';
 import { trackForComparison } from './comparing';
@@ -106,7 +106,7 @@ class Session {
     let made: Volume = original;
     try {
       if (isSmall) {
-        checkPlanes(original);
+        checkSmallImage({ dims: [...original.dims, original.frames] });
         checkSmall(original, setup.preparation);
       }
       made = prepare(original, setup.preparation, tell);
@@ -223,7 +223,8 @@ class Session {
     try {
       await tracker.run({ signal, onStep: (report) => this.#stepped(report) });
     } catch (error) {
-      if (!signal.aborted) send({ event: 'failure', failure: toFailure(inWords(error)) });
+      // After the state event, so that the page shows the failure on top of that state.
+      if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: toFailure(inWords(error)) }));
     }
     this.#reportStopped();
   }

@@ -27,14 +27,16 @@ export function paintSlice(
   const strides = [1, volume.dims[0], volume.dims[0] * volume.dims[1]] as const;
   const across = strides[orientation.horizontal.axis] * (orientation.horizontal.flip ? -1 : 1);
   const first = orientation.horizontal.flip ? (width - 1) * strides[orientation.horizontal.axis] : 0;
-  const scale = high > low ? 255 / (high - low) : 0;
+  const [slope, intercept] = volume.scale ?? [1, 0];
+  const black = (low - intercept) / slope;
+  const scale = high > low ? (255 * slope) / (high - low) : 0;
   let target = 0;
   for (let j = 0; j < height; j++) {
     const row = (orientation.vertical.flip ? height - 1 - j : j) * strides[orientation.vertical.axis];
     let source = index * strides[orientation.axis] + row + first;
     for (let i = 0; i < width; i++) {
       // The array of pixels rounds and clamps.
-      const value = ((volume.voxels[source] ?? 0) - low) * scale;
+      const value = ((volume.voxels[source] ?? 0) - black) * scale;
       const grey = volume.inverted ? 255 - value : value;
       out[target++] = grey;
       out[target++] = grey;

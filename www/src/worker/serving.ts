@@ -85,6 +85,11 @@ export function withTransfer<Reply extends object>(reply: Reply, arrays: ArrayBu
   return reply;
 }
 
+/** Holds a lock until the worker has ended, so that the page knows when its memory is given back. */
+function hold(lock: string): undefined {
+  void navigator.locks?.request(lock, () => new Promise(() => undefined));
+}
+
 /**
  * Runs the handler for a request of the page when the engine is `ready`, and replies with the handler's result, or with its
  * failure.
@@ -94,7 +99,7 @@ export async function reply(
   { id, kind, body }: { id: number; kind: string; body: unknown },
   ready?: Promise<unknown>,
 ): Promise<void> {
-  const handler = handlers[kind] as (body: unknown) => unknown;
+  const handler = (kind === 'hold' ? hold : handlers[kind]) as (body: unknown) => unknown;
   try {
     await ready;
     const result = await handler(body);

@@ -3,7 +3,7 @@ import { type LengthUnit, VesicleError, Volume, type VolumeInit } from 'vesicle'
 import startReaders, { parseVolume } from 'vesicle/import';
 import type { FileNotes, Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
 import { shapeVoxels } from '../shapes';
-import { SMALL } from '../small-files';
+import { MOST_VOXELS_OF_SMALL, SMALL } from '../small-files';
 import { text } from '../texts';
 import { quantiles } from '../threshold';
 import { concerning, type Warning } from '../warnings';
@@ -88,12 +88,25 @@ export function checkPlanes({ dims }: Pick<Volume, 'dims'>): void {
   );
 }
 
+/** Throws a `Refusal` if an image in small files has too many voxels, or planes with too many pixels, to be shown. */
+export function checkSmallImage({ dims: [x, y, z, frames = 1] }: Pick<VolumeInit, 'dims'>): void {
+  checkPlanes({ dims: [x, y, z] });
+  const voxels = x * y * z * frames;
+  if (voxels <= MOST_VOXELS_OF_SMALL) return;
+  const [most, given] = [MOST_VOXELS_OF_SMALL, voxels].map((count) => Math.round(count / 1e6));
+  throw new Refusal(
+    'too-large',
+    text('files.tooManyVoxels', { millions: given as number, kilobytes: SMALL / 2 ** 10, most: most as number }),
+  );
+}
+
 /**
  * Returns a frame of the computed volume of a shape, or of one in files of any supported format, the library's own or
  * one that other libraries read.
  */
-export async function openFrame(source: VolumeSource, frame: number): Promise<OpenFrame> {
+export async function openFrame(source: VolumeSource, frame: number, isSmall = false): Promise<OpenFrame> {
   const { frameSeconds: _, warnings = [], ...init } = await read(source);
+  if (isSmall) checkSmallImage(init);
   const [x, y, z, frames = 1] = init.dims;
   if (!Number.isInteger(frame) || frame < 0 || frame >= frames)
     throw new Refusal('invalid-argument', text('slices.noFrame', { last: frames - 1, frame }));
@@ -105,7 +118,10 @@ export async function openFrame(source: VolumeSource, frame: number): Promise<Op
 }
 
 /** Returns voxels that are what {@link intensitiesOf} would make of their volume, which saves a copy; otherwise undefined. */
-function displayed({ data, slope = 1, intercept = 0 }: VolumeInit, range: [number, number]): Intensities | undefined {
+export function displayed(
+  { data, slope = 1, intercept = 0 }: VolumeInit,
+  range: [number, number],
+): Intensities | undefined {
   const narrow = narrowArray(range, 0);
   const isSame = slope === 1 && intercept === 0 && data.constructor === narrow?.constructor;
   // Of a longer buffer, a part cannot be given away.
@@ -184,15 +200,30 @@ export function viewOf(volume: Volume, name: string, voxels = intensitiesOf(volu
  * and white.
  */
 export function levelsOf(volume: Volume, levels: number, window: [number, number]): LevelView[] {
+  const isInteger = narrowArray(volume.range, 0) !== undefined;
   const [same, ...coarser] = volume.pyramid(levels + 1);
   same?.free();
   return coarser.map((level) => {
     try {
-      return { dims: level.dims, voxels: intensitiesOf(level), window };
+      // Means of integers are none, but need no more steps than these have: half the memory is enough.
+      return { dims: level.dims, window, ...(isInteger ? inSteps(level) : { voxels: intensitiesOf(level) }) };
     } finally {
       level.free();
     }
   });
+}
+
+/** Returns the intensities of a volume in 65,536 steps. */
+export function inSteps(volume: Volume): Required<Pick<LevelView, 'voxels' | 'scale'>> {
+  const [nx, ny, nz] = volume.dims;
+  const [low, high] = volume.range;
+  const step = (high - low) / 0xffff || 1;
+  const voxels = new Uint16Array(nx * ny * nz);
+  for (let z = 0; z < nz; z++) {
+    const values = volume.slice(2, z);
+    for (let i = 0; i < values.length; i++) voxels[z * nx * ny + i] = Math.round(((values[i] ?? 0) - low) / step);
+  }
+  return { voxels, scale: [step, low] };
 }
 
 /** Returns the intensities of the first `frames` frames in the narrowest type that holds all of them exactly. */
