@@ -691,6 +691,22 @@ fn a_surface_has_at_most_as_many_vertices_as_allowed_and_goes_on_once_more_are()
     assert!(run(&mut model, 2000).done && model.mesh().vertex_count() > most);
 }
 
+/// Regression: edits remove most of the vertices of a contour, but if more than allowed were left, the model began with them.
+#[test]
+fn a_contour_has_at_most_as_many_vertices_as_allowed() {
+    let volume = ball([64, 64, 64], 22.0);
+    let params = DeformableParams { adaptivity: 0.0, ..DeformableParams::for_volume(&volume) };
+    let options = DeformableOptions { levels: 0, params: Some(params), ..Default::default() };
+    let count = DeformableModel::new(&volume, options.clone()).unwrap().mesh().vertex_count();
+    for (most, fits) in [(2 * count, true), (count - 1, false)] {
+        let options = DeformableOptions { max_vertices: Some(most), ..options.clone() };
+        match DeformableModel::new(&volume, options) {
+            Ok(model) => assert!(fits && model.mesh().vertex_count() <= most),
+            Err(error) => assert!(!fits && matches!(error, MethodError::TooManyVertices { .. }), "{error}"),
+        }
+    }
+}
+
 /// Regression: on a coarse level, some vertices of this tooth are where the image is so steep that they oscillated
 /// forever under the forces of coarse levels. They are at the border of the image, which is less steep since objects end
 /// half a voxel beyond it.

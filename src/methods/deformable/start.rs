@@ -201,6 +201,11 @@ impl DeformableModel {
             // Later calls have no contour to return to, so all their edits are tested, also after an error.
             self.resolver.set_tested_cells(None);
             resolved?;
+            // A contour has more before its edits, which add none.
+            let most = self.domain.max_vertices;
+            if self.mesh.vertex_count() > most {
+                return Err(MethodError::TooManyVertices { most });
+            }
             let sampling = self.sampling();
             let guard = self.resolver.embedding(&self.mesh, sampling);
             let intersecting = guard.intersecting_vertices_in_slices(&self.mesh, pauses).await;
