@@ -23,7 +23,7 @@ const MOVES: usize = 4;
 const MAX_VALENCE: usize = 10;
 
 /// The highest valence of a vertex that is collapsed or moved: with more neighbours its angles are small wherever it is, and
-/// each attempt looks at all of them for each of them.
+/// each attempt visits all of them for each of them.
 const MOST_NEIGHBOURS: usize = 64;
 
 /// Improves triangle angles below 33° by flips, collapses and moves that keep edge lengths within bounds or bring them
