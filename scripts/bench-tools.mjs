@@ -13,12 +13,12 @@ const HEADING = '## Figures\n';
 /** Returns a row for each task and package, or one without a package, with the figures of all sides; and those of a page. */
 export async function compareTools(repeats) {
   const page = await (await import('../bench/labels-page.mjs')).measure();
-  const { measure } = await import('../bench/tools.mjs');
+  const { measure, ...sizes } = await import('../bench/tools.mjs');
   const [ours, native] = [await measure(repeats), await toolsNatively(repeats)];
   const host = `Node ${process.versions.node}`;
   return inFolder(async (folder) => {
     const found = await measureTheirs(await writeJob(folder, repeats));
-    const rows = named(ours).flatMap((one) => {
+    const rows = named(ours, sizes).flatMap((one) => {
       const task = { host, ...PER_RUN, volume: ours.volume, ...one, ours: ours.tasks[one.task] };
       const sides = one.packages ? one.packages.map((name) => compare(task, name, found)) : [alone(task)];
       return sides.map(async (row) => ({ ...(await row), native: { figure: native[one.task] } }));
@@ -27,15 +27,15 @@ export async function compareTools(repeats) {
   });
 }
 
-function named({ triangles }) {
+function named({ triangles }, { ITERATIONS, WITHIN, DISTANCES }) {
   const size = `${triangles.toLocaleString('en')} triangles`;
   return [
     { task: 'labels', name: 'Surfaces of a label map, 192³ voxels, 30 labels that touch', packages: ['vtk'] },
     { task: 'noise', name: 'Surfaces of noise of 254 labels, 64³ voxels' },
-    { task: 'smooth', name: `Smoothing, 20 iterations, ${size}`, packages: ['pymeshlab'] },
+    { task: 'smooth', name: `Smoothing, ${ITERATIONS} iterations, ${size}`, packages: ['pymeshlab'] },
     { task: 'decimate', name: `Decimation to a tenth, ${size}`, packages: ['pymeshlab', 'vtk'] },
-    { task: 'decimate within', name: `Decimation within .2 voxels, ${size}` },
-    { task: 'distance', name: `Signed distances, 256³ voxels, ${size}` },
+    { task: 'decimate within', name: `Decimation within ${WITHIN} voxels, ${size}` },
+    { task: 'distance', name: `Signed distances, ${DISTANCES}³ voxels, ${size}` },
   ];
 }
 

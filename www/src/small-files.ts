@@ -1,6 +1,7 @@
 /** Which files are small: they may come from anyone, and may not take long. */
 import type { NamedBytes } from './protocol';
 import type { Session } from './session/schema';
+import { type TextKey, text } from './texts';
 
 /** Bytes of files that are small, all together. */
 export const SMALL = 2 ** 17;
@@ -17,6 +18,12 @@ export const TRACK_OF_SMALL = { maxVertices: 200_000, maxVoxels: 8_000_000 };
 export function isOfSmall(session: Session | undefined, files: readonly (Blob | NamedBytes)[] | undefined): boolean {
   if (session?.isSmall && session.source.files.every(({ content }) => content)) return true;
   return files !== undefined && areSmall(files);
+}
+
+/** Returns a text that refuses data of small files which have `count` pixels or voxels, more than `most`; both are in millions there. */
+export function beyondSmall(key: TextKey, count: number, most: number): string {
+  const millions = (count: number) => Math.round(count / 1e6);
+  return text(key, { millions: millions(count), kilobytes: SMALL / 2 ** 10, most: millions(most) });
 }
 
 /** Returns whether files are small, all together. */

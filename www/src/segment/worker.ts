@@ -64,8 +64,8 @@ class LiveMap {
       throw error;
     }
     this.#countAll(voxels);
-    const largest = Math.max(...Array.from(this.#counts.keys(), Math.abs));
-    if (voxels.length <= MOST_KEPT || largest > LARGEST_READ) this.#voxels = voxels;
+    const isReadExactly = [...this.#counts.keys()].every((label) => Math.abs(label) <= LARGEST_READ);
+    if (voxels.length <= MOST_KEPT || !isReadExactly) this.#voxels = voxels;
   }
 
   /** Returns the labels, which the map was made of, for the page: a copy if they are kept here, too. */

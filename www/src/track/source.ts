@@ -1,7 +1,7 @@
 /** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
 
 import { SurfaceTracker, VesicleError, Volume } from 'vesicle';
-import { MOST_VOXELS_OF_SMALL, SMALL, TRACK_OF_SMALL } from '../small-files';
+import { beyondSmall, MOST_VOXELS_OF_SMALL, TRACK_OF_SMALL } from '../small-files';
 import { text } from '../texts';
 import { invert } from '../view/anatomy';
 import { groupFiles } from '../worker/file-groups';
@@ -66,15 +66,7 @@ export function checkSmall(
     preparation.factor || Math.min(MOST_SLICES, Math.max(1, Math.round(thickest / ((finest + middle) / 2))));
   const voxels = (dims[0] * dims[1] * dims[2] * frames * factor) / preparation.binning ** 2;
   if (voxels <= MOST_VOXELS_OF_SMALL) return;
-  const millions = (count: number) => Math.round(count / 1e6);
-  throw new Refusal(
-    'too-large',
-    text('track.smallTooLarge', {
-      millions: millions(voxels),
-      kilobytes: SMALL / 2 ** 10,
-      most: millions(MOST_VOXELS_OF_SMALL),
-    }),
-  );
+  throw new Refusal('too-large', beyondSmall('track.smallTooLarge', voxels, MOST_VOXELS_OF_SMALL));
 }
 
 /**

@@ -3,7 +3,7 @@ import { type LengthUnit, VesicleError, Volume, type VolumeInit } from 'vesicle'
 import startReaders, { parseVolume } from 'vesicle/import';
 import type { FileNotes, Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
 import { shapeVoxels } from '../shapes';
-import { MOST_VOXELS_OF_SMALL, SMALL } from '../small-files';
+import { beyondSmall, MOST_VOXELS_OF_SMALL } from '../small-files';
 import { text } from '../texts';
 import { quantiles } from '../threshold';
 import { concerning, type Warning } from '../warnings';
@@ -77,15 +77,7 @@ export function checkPlanes({ dims }: Pick<Volume, 'dims'>): void {
   const [, middle = 1, longest = 1] = [...dims].sort((a, b) => a - b);
   const pixels = middle * longest;
   if (pixels <= MOST_PIXELS_OF_SMALL) return;
-  const millions = (count: number) => Math.round(count / 1e6);
-  throw new Refusal(
-    'too-large',
-    text('files.planesTooLarge', {
-      millions: millions(pixels),
-      kilobytes: SMALL / 2 ** 10,
-      most: millions(MOST_PIXELS_OF_SMALL),
-    }),
-  );
+  throw new Refusal('too-large', beyondSmall('files.planesTooLarge', pixels, MOST_PIXELS_OF_SMALL));
 }
 
 /** Throws a `Refusal` if an image in small files has too many voxels, or planes with too many pixels, to be shown. */
@@ -93,11 +85,7 @@ export function checkSmallImage({ dims: [x, y, z, frames = 1] }: Pick<VolumeInit
   checkPlanes({ dims: [x, y, z] });
   const voxels = x * y * z * frames;
   if (voxels <= MOST_VOXELS_OF_SMALL) return;
-  const [most, given] = [MOST_VOXELS_OF_SMALL, voxels].map((count) => Math.round(count / 1e6));
-  throw new Refusal(
-    'too-large',
-    text('files.tooManyVoxels', { millions: given as number, kilobytes: SMALL / 2 ** 10, most: most as number }),
-  );
+  throw new Refusal('too-large', beyondSmall('files.tooManyVoxels', voxels, MOST_VOXELS_OF_SMALL));
 }
 
 /**
