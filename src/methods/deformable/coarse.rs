@@ -3,6 +3,7 @@
 
 use super::image::Pyramid;
 use super::{DeformableParams, Integrator};
+use crate::pauses::Pauses;
 
 /// The offset of the iso value from π_I towards the background, on coarse pyramid levels of runs that do not seed
 /// missing parts, as a share of the difference between π_I and the mean intensity of the background.
@@ -75,18 +76,28 @@ pub(super) fn iso(pyramid: &Pyramid, params: &DeformableParams, level: usize) ->
 /// Returns the factor, at least 1, by which a pyramid level multiplies α_I, the strength of the image force; `iso` is
 /// the normalised π_I of the level, `delta` its δ in voxels of the finest level. With the implicit integrator the
 /// factor makes up for faint images on all levels if the model adapts to the image, and is 1 otherwise; with the others
-/// it speeds up coarse levels, and is 1 on the finest.
-pub(super) fn gain(
+/// it speeds up coarse levels, and is 1 on the finest. Pauses meanwhile.
+pub(super) async fn gain(
     pyramid: &Pyramid,
     params: &DeformableParams,
     level: usize,
     [iso, delta]: [f32; 2],
+    pauses: &Pauses,
 ) -> f32 {
     let image = &pyramid.levels[level];
-    if is_measured_by_median(params) {
-        return factor(params, level, delta, &|| image.median_steepness(iso));
-    }
-    factor(params, level, delta, &|| image.steepness(iso))
+    let steepness = if is_measured_by_median(params) {
+        image.median_steepness(iso, pauses).await
+    } else if is_sped_up(params, level) {
+        image.steepness(iso, pauses).await
+    } else {
+        return 1.0;
+    };
+    factor(params, level, delta, &|| steepness)
+}
+
+/// Returns whether a level has a factor on α_I that speeds it up.
+fn is_sped_up(params: &DeformableParams, level: usize) -> bool {
+    level > 0 && params.iso_force != 0.0 && params.integrator != Integrator::Implicit
 }
 
 /// Returns whether the factor on α_I depends on the median of the steepness of the image, not on its root mean square.
@@ -105,7 +116,7 @@ pub(super) fn factor(
         let steepness = steepness();
         return if steepness > 0.0 { (MIN_STEEPNESS / steepness).clamp(1.0, MAX_AMPLIFICATION) } else { 1.0 };
     }
-    if level == 0 || params.iso_force == 0.0 || params.integrator == Integrator::Implicit {
+    if !is_sped_up(params, level) {
         return 1.0;
     }
     let stiffness = params.iso_force.abs() as f32 * delta * steepness();
@@ -127,6 +138,7 @@ pub(super) fn decayed(gain: f32, iterations: u32) -> f32 {
 mod tests {
     use super::*;
 
+    use crate::pauses::finished;
     use crate::volume::{Volume, VolumeInit, Voxels};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -181,7 +193,10 @@ mod tests {
     #[test]
     fn the_gain_is_for_coarse_levels_faint_images_and_rigid_surfaces() {
         let (faint, steep) = (ramp(39.0), ramp(1.0));
-        let of = |pyramid, force, rigidity, level| gain(pyramid, &params(force, rigidity), level, [0.5, 1.5]);
+        let of = |pyramid, force, rigidity, level| {
+            let params = params(force, rigidity);
+            finished(gain(pyramid, &params, level, [0.5, 1.5], &Pauses::default()))
+        };
         assert_eq!(of(&faint, -1.0, 0.2, 1), MAX_GAIN);
         assert_eq!(of(&faint, -1.0, 0.2, 0), 1.0);
         assert_eq!(of(&faint, 0.0, 0.2, 1), 1.0);

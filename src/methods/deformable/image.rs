@@ -272,29 +272,30 @@ impl LevelImage {
 
     /// Returns the steepness of the image at `iso`: the root mean square of the differences between neighbouring voxels
     /// on opposite sides of `iso`, per model unit; 0 if there are none. It limits the factor on the image force on
-    /// coarse levels.
-    pub(super) fn steepness(&self, iso: f32) -> f32 {
+    /// coarse levels. Pauses meanwhile.
+    pub(super) async fn steepness(&self, iso: f32, pauses: &Pauses) -> f32 {
         let (mut sum, mut count) = (0.0f64, 0usize);
-        self.for_each_iso_crossing(iso, |difference| {
+        let add = |difference| {
             sum += f64::from(difference * difference);
             count += 1;
-        });
+        };
+        self.for_each_iso_crossing(iso, add, pauses).await;
         let mean = if count > 0 { sum / count as f64 } else { 0.0 };
         mean.sqrt() as f32 * self.voxels_per_unit()
     }
 
     /// Returns the median of the absolute differences between neighbouring voxels on opposite sides of `iso`, per model
     /// unit; 0 if there are none. Unlike [`Self::steepness`], it is not affected by a few edges much steeper than the
-    /// others; faint images are recognised by it.
-    pub(super) fn median_steepness(&self, iso: f32) -> f32 {
+    /// others; faint images are recognised by it. Pauses meanwhile.
+    pub(super) async fn median_steepness(&self, iso: f32, pauses: &Pauses) -> f32 {
         let mut differences = Vec::new();
-        self.for_each_iso_crossing(iso, |difference| differences.push(difference.abs()));
+        self.for_each_iso_crossing(iso, |difference| differences.push(difference.abs()), pauses).await;
         median(differences.into_iter()).map_or(0.0, |difference| difference * self.voxels_per_unit())
     }
 
     /// Calls `visit` with the signed difference of intensity, per part of a voxel, of each pair of voxels that share a face
     /// and are on opposite sides of `iso`, from which the steepness of the image is computed.
-    fn for_each_iso_crossing(&self, iso: f32, mut visit: impl FnMut(f32)) {
+    async fn for_each_iso_crossing(&self, iso: f32, mut visit: impl FnMut(f32), pauses: &Pauses) {
         let [nx, ny, nz] = self.grid.dims();
         let parts = self.parts.map(|n| n as f32);
         let mut pass = |a: &[f32], b: &[f32], axis: usize| {
@@ -317,6 +318,7 @@ impl LevelImage {
                     pass(&above[at(k)], row, 2);
                 }
             }
+            pauses.after(block * nx / VOXELS_PER_UNIT).await;
         }
     }
 

@@ -71,7 +71,7 @@ impl DeformableModel {
         let delta = self.pyramid.delta_at(self.finest_delta, level);
         let context = StartContext::of(&self.pyramid, &self.params, self.domain, delta, &self.to_world);
         let Some(mut mesh) = finished(contour_mesh(&context, &Pauses::default()))? else {
-            self.prepare_level()?;
+            finished(self.prepare_level(&Pauses::default()))?;
             self.wake_all();
             return Ok(());
         };

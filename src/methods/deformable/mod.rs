@@ -399,7 +399,7 @@ impl DeformableModel {
     /// Prepares a start mesh for the first iteration.
     async fn begin_on(&mut self, contour: bool, pauses: &Pauses) -> Result<(), MethodError> {
         self.watch_output();
-        self.prepare_level()?;
+        self.prepare_level(pauses).await?;
         pauses.now().await;
         if contour {
             self.resolve_contour(pauses).await?
@@ -639,7 +639,7 @@ impl DeformableModel {
         let adapted = self.pyramid.adapted(&params)?;
         let image = adapted.map(|adapted| std::mem::replace(&mut self.pyramid, adapted));
         let before = std::mem::replace(&mut self.params, params);
-        if let Err(error) = self.prepare_level() {
+        if let Err(error) = finished(self.prepare_level(&Pauses::default())) {
             self.params = before;
             if let Some(image) = image {
                 self.pyramid = image;
@@ -701,7 +701,7 @@ impl DeformableModel {
 
     /// Computes the quantities that depend on the pyramid level and the parameters: the gradient image if a gradient
     /// force acts, the iso value π_I and the factor on α_I, the strength of the image force.
-    fn prepare_level(&mut self) -> Result<(), MethodError> {
+    async fn prepare_level(&mut self, pauses: &Pauses) -> Result<(), MethodError> {
         self.pyramid.levels[self.level].prepare_gradient_for(&self.params)?;
         self.motion.forces.forget_image();
         self.needs_factor = self.pyramid.levels[self.level].bricks().is_some();
@@ -715,7 +715,7 @@ impl DeformableModel {
             coarse::iso(&self.pyramid, &self.params, self.level)
         };
         let here = [self.level_iso, self.model_delta()];
-        self.image_force_factor = coarse::gain(&self.pyramid, &self.params, self.level, here);
+        self.image_force_factor = coarse::gain(&self.pyramid, &self.params, self.level, here, pauses).await;
         Ok(())
     }
 

@@ -59,7 +59,7 @@ impl DeformableModel {
         let levels = self.pyramid.levels.len() - 1;
         let new = Pyramid::new(volume, self.frame, levels, &self.params)?;
         let before = std::mem::replace(&mut self.pyramid, new);
-        if let Err(error) = self.prepare_level() {
+        if let Err(error) = finished(self.prepare_level(&Pauses::default())) {
             self.pyramid = before;
             return Err(error);
         }

@@ -300,7 +300,7 @@ impl DeformableModel {
         self.begin_sizes(before / self.model_delta());
         self.convergence.began = self.iteration;
         self.wake_all();
-        self.prepare_level()
+        self.prepare_level(pauses).await
     }
 
     async fn refine(&mut self, pauses: &Pauses) -> Result<(), MethodError> {
