@@ -33,6 +33,10 @@ class Page {
 class NameOpening extends Opening<Example, Linked, string, string> {
   protected readonly first = { id: 'first' };
   readonly faults = new Map<string, Error>();
+  /** Errors of data that cannot be read. */
+  readonly unread = new Map<string, Error>();
+  /** Bytes of all data. */
+  bytes = 0;
   readonly #page: Page;
 
   constructor(page: Page) {
@@ -52,9 +56,15 @@ class NameOpening extends Opening<Example, Linked, string, string> {
   protected fromExample = (example: Example) => ({ name: example.id, load: async () => example.id, example });
   protected fromFiles = ([file]: File[]) => {
     const name = file?.name ?? '';
-    return { name, load: () => (name === 'slow' ? new Promise<string>(() => undefined) : Promise.resolve(name)) };
+    const load = () => (name === 'slow' ? new Promise<string>(() => undefined) : Promise.resolve(name));
+    return { name, load, isKept: name !== 'not kept' };
   };
-  protected load = async (_: AnySource, data: string) => data;
+  protected load = async (_: AnySource, data: string) => {
+    const fault = this.unread.get(data);
+    if (fault) throw fault;
+    return data;
+  };
+  protected override sizeOf = () => this.bytes;
   protected async adopt(opened: string, source: AnySource): Promise<void> {
     this.#page.states.ready = true;
     this.#page.shown = `half ${opened}`;
@@ -111,4 +121,30 @@ test('the first data can be cancelled from the beginning, unless there is nothin
   await first;
   expect(page).toMatchObject({ shown: 'first', restarts: 1 });
   expect(offers).toEqual([false, true, false]);
+});
+
+test('what is open gives back its memory before other data are read, and is opened again if they cannot be', async () => {
+  const page = new Page();
+  const opening = new NameOpening(page);
+  opening.unread.set('bad', new RequestError({ code: 'bad-file', message: 'no image' }));
+  opening.bytes = 2 ** 25;
+  await opening.files(files);
+  expect(page.restarts).toBe(0);
+  await opening.files([new File([], 'other')]);
+  expect(page).toMatchObject({ shown: 'other', restarts: 1 });
+  await opening.files([new File([], 'bad')]);
+  expect(page).toMatchObject({ shown: 'other', message: 'bad could not be opened. no image' });
+  expect(page.states.value).toBe('paused');
+});
+
+test.each([
+  ['light data', 'mine', 2 ** 20],
+  ['data that are not kept, and may be gone', 'not kept', 2 ** 25],
+])('%s stay in the engine until others are open', async (_, name, bytes) => {
+  const page = new Page();
+  const opening = new NameOpening(page);
+  opening.bytes = bytes;
+  await opening.files([new File([], name)]);
+  await opening.files([new File([], 'other')]);
+  expect(page).toMatchObject({ shown: 'other', restarts: 0 });
 });

@@ -6,7 +6,10 @@ import { type TextKey, text } from './texts';
 /** Bytes of files that are small, all together. */
 export const SMALL = 2 ** 17;
 
-/** Most voxels of an image of small files, with slices between its own: the page and its worker have some copies of them. */
+/** Most bytes of the voxels of an image of small files: the page and its worker have some copies of them. */
+export const MOST_BYTES_OF_SMALL = 2 ** 26;
+
+/** Most voxels of a 4D image of small files in Track, with slices between its own. */
 export const MOST_VOXELS_OF_SMALL = 2 ** 26;
 
 /** Limits of what the labs make of small data; with more, the page takes over a gigabyte. */
@@ -21,9 +24,9 @@ export function isOfSmall(session: Session | undefined, files: readonly (Blob | 
 }
 
 /** Returns a text that refuses data of small files which have `count` pixels or voxels, more than `most`; both are in millions there. */
-export function beyondSmall(key: TextKey, count: number, most: number): string {
+export function beyondSmall(key: TextKey, count: number, most: number, more: Record<string, number> = {}): string {
   const millions = (count: number) => Math.round(count / 1e6);
-  return text(key, { millions: millions(count), kilobytes: SMALL / 2 ** 10, most: millions(most) });
+  return text(key, { millions: millions(count), kilobytes: SMALL / 2 ** 10, most: millions(most), ...more });
 }
 
 /** Returns whether files are small, all together. */

@@ -7,7 +7,7 @@ import { contentOf } from '../session/recognise';
 import type { ContentOf } from '../session/schema';
 import { isOfSmall } from '../small-files';
 import { text } from '../texts';
-import { nameOf, readFiles } from '../ui/files';
+import { nameOf, reading } from '../ui/files';
 import { count } from '../ui/format';
 import { type StartChoice, USUAL_START } from '../ui/start';
 import { fetchBytes, preload } from './downloads';
@@ -117,7 +117,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     const [archive] = files;
     if (files.length === 1 && archive && /\.zip$/i.test(archive.name))
       return { name: archive.name, load: async () => ({ zarr: archive }) };
-    return { name: nameOf(files), load: async () => ({ files: await readFiles(files) }) };
+    return { name: nameOf(files), ...reading(files) };
   }
 
   protected async load(source: ExtractSource, volume: ImageSource, reopening: boolean): Promise<OpenedVolume> {
@@ -179,6 +179,10 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
 
   protected override kept(): void {
     if (this.source) this.#ui.showFrame(this.source);
+  }
+
+  protected override sizeOf({ volume }: OpenedVolume): number {
+    return volume.voxels.byteLength;
   }
 
   override filesOf(source: ImageSource): NamedBytes[] {

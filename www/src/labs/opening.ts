@@ -12,6 +12,9 @@ import { LinkError, readLink } from './link-query';
 /** Milliseconds that a busy worker has to save its model before it is terminated because the user cancels. */
 const SAVE_TIMEOUT_MS = 300;
 
+/** Bytes of voxels beyond which what is open gives back its memory before other data are read. */
+const HEAVY = 2 ** 24;
+
 /**
  * Data that a lab opens (an example, the user's files, or data of another lab), with all that is needed to open it
  * again after a failure of the engine.
@@ -31,6 +34,8 @@ export interface Source<Example, Linked, Data> {
   isChange?: boolean;
   /** Whether the data are nowhere but in the app, since another lab has made them. */
   isMade?: boolean;
+  /** Whether the page keeps the data, so that they can be opened again at any time. */
+  isKept?: boolean;
   /** Warnings about the data, which they do not have themselves. */
   warnings?: readonly Warning[];
 }
@@ -84,6 +89,8 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    * broken, and is restarted with what is displayed.
    */
   #modelMismatch = false;
+  /** Whether what is open gives back its memory before other data are read, as it can be opened again if these cannot be. */
+  #givesWay = false;
 
   /** Called when other data have taken the place of those that were open. */
   onReplaced: () => void = () => undefined;
@@ -135,6 +142,11 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     _data: Data,
   ): Source<Example, Linked, Data> {
     return source;
+  }
+
+  /** Returns the bytes of the voxels of what was opened; none by default. */
+  protected sizeOf(_opened: Opened): number {
+    return 0;
   }
 
   /**
@@ -338,6 +350,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       await this.#loads;
       await this.#adoption;
       if (request !== this.#requestCount) return;
+      if (!reopening && !source.isChange) await this.#makeRoom();
       await this.#needEngine();
       const opened = await this.#load(source, data, reopening);
       if (request !== this.#requestCount) return;
@@ -345,6 +358,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       const before = this.#source;
       this.#source = this.sourceToRemember(source, opened, data);
       this.#modelMismatch = false;
+      this.#givesWay = (source.isKept ?? source.isMade ?? false) && this.sizeOf(opened) > HEAVY;
       if (!reopening) this.onReplaced();
       if (source.linked && source.linked === this.#awaiting) this.#awaiting = undefined;
       const adoption = this.adopt(opened, source, reopening);
@@ -417,6 +431,16 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     await this.open(source);
     if (this.states.value === 'error' || this.#source !== source) return;
     this.#ui.banner.show(text('labs.linkSettingsIgnored'), text('labs.linkSettingRejected', { reason: why }));
+  }
+
+  /**
+   * Has the engine restarted if what is open takes much memory, which a worker keeps as long as it lives, although the
+   * data are small; should opening fail, they are opened again.
+   */
+  async #makeRoom(): Promise<void> {
+    if (!this.#givesWay) return;
+    await Promise.race([this.saved(), later(SAVE_TIMEOUT_MS)]);
+    this.states.engineBroken = true;
   }
 
   /** Restarts the engine if it is broken. */

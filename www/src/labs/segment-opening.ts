@@ -3,7 +3,7 @@ import type { SegmentClient } from '../segment/client';
 import { SEGMENT_EXAMPLES, type SegmentExample, segmentExampleById } from '../segment/examples';
 import type { ImageSource, LabelArray, NamedBytes, OpenedImage, ParamSpec } from '../segment/protocol';
 import { contentOf } from '../session/recognise';
-import { nameOf, readFiles } from '../ui/files';
+import { nameOf, reading } from '../ui/files';
 import { fetchBytes } from './downloads';
 import type { LabStates } from './lab-states';
 import type { Handoff } from './labs';
@@ -42,7 +42,7 @@ export class SegmentOpening extends Opening<SegmentExample, LinkedSegment, Image
 
   /** Opens a label map that another lab passes on. */
   override passedOn({ name, bytes, warnings = [] }: Handoff): Promise<void> {
-    return this.open({ name, load: async () => ({ files: [{ name, bytes }] }), warnings });
+    return this.open({ name, load: async () => ({ files: [{ name, bytes }] }), isKept: true, warnings });
   }
 
   protected find(id: string): SegmentExample | undefined {
@@ -58,7 +58,11 @@ export class SegmentOpening extends Opening<SegmentExample, LinkedSegment, Image
   }
 
   protected fromFiles(files: File[]): SegmentSource {
-    return { name: nameOf(files), load: async () => ({ files: await readFiles(files) }) };
+    return { name: nameOf(files), ...reading(files) };
+  }
+
+  protected override sizeOf({ volume }: OpenedImage): number {
+    return volume.voxels.byteLength;
   }
 
   override filesOf({ files }: ImageSource): NamedBytes[] {

@@ -6,7 +6,7 @@ import type { TrackClient } from '../track/client';
 import { IMAGES, type TrackExample } from '../track/examples';
 import { imageById } from '../track/presets';
 import type { ImageSource, NamedBytes, OpenedImage as OpenedFilm, Setup } from '../track/protocol';
-import { nameOf, readFiles } from '../ui/files';
+import { nameOf, reading } from '../ui/files';
 import { fetchBytes } from './downloads';
 import type { LabStates } from './lab-states';
 import { Opening, type Source } from './opening';
@@ -57,7 +57,11 @@ export class TrackOpening extends Opening<TrackExample, LinkedTrack, ImageSource
   }
 
   protected fromFiles(files: File[]): TrackSource {
-    return { name: nameOf(files), load: async () => ({ files: await readFiles(files) }) };
+    return { name: nameOf(files), ...reading(files) };
+  }
+
+  protected override sizeOf({ volume }: OpenedTrack): number {
+    return volume.voxels.byteLength;
   }
 
   override filesOf(source: ImageSource): NamedBytes[] {

@@ -55,7 +55,7 @@ export async function openImage({ files, labelling }: ImageSource, isSmall = fal
   if (isSmall) checkSmallImage(image.init);
   const volume = new Volume(image.init);
   try {
-    const labels = map ? labelsOf(map, volume) : computed(volume, labelling);
+    const labels = map ? labelsOf(map, volume, map === image) : computed(volume, labelling);
     const voxels = volume.frames === 1 ? displayed(image.init, volume.range) : undefined;
     return { volume, map: labels, unit: image.init.unit, looksLike, voxels };
   } catch (error) {
@@ -139,9 +139,12 @@ function valuesIn({ init: { data } }: NamedVolume): number {
   return found.size;
 }
 
-/** Returns the label map in the grid of a volume, in the type of its file unless this has slope and intercept. */
-function labelsOf({ name, init, known, isCropped }: NamedVolume, volume: Volume): OpenMap {
-  const map = new Volume(init);
+/**
+ * Returns the label map in the grid of a volume, in the type of its file unless this has slope and intercept; `isBoth` if
+ * the volume was made of it.
+ */
+function labelsOf({ name, init, known, isCropped }: NamedVolume, volume: Volume, isBoth = false): OpenMap {
+  const map = isBoth ? volume : new Volume(init);
   try {
     if (!isCropped) requireSameGrid(map, volume);
     // Says what is wrong with voxels that are no labels.
@@ -152,7 +155,7 @@ function labelsOf({ name, init, known, isCropped }: NamedVolume, volume: Volume)
     const voxels = isPlain ? (init.data.slice(0, count) as LabelArray) : Int32Array.from(map.intensities());
     return { voxels: isCropped ? placed(map, voxels, volume) : voxels, known, file: name, warnings: map.warnings };
   } finally {
-    map.free();
+    if (!isBoth) map.free();
   }
 }
 

@@ -6,7 +6,7 @@ import { text } from '../texts';
 import { invert } from '../view/anatomy';
 import { groupFiles } from '../worker/file-groups';
 import { Refusal } from '../worker/refusal';
-import { parseFiles } from '../worker/volumes';
+import { checkSmallImage, readFiles } from '../worker/volumes';
 import { boxOf, voxelsOf } from './box';
 import { cineVoxels } from './cine';
 import type { ImageSource, NamedBytes, ObjectQuery, Preparation, Proposal, Setup } from './protocol';
@@ -16,8 +16,8 @@ const CINE_SECONDS = 0.04;
 /** Digits of a proposed threshold, which is shown, and is in links and code: far finer than it could be chosen. */
 const THRESHOLD_DIGITS = 4;
 
-/** Opens a 4D image: reads it from files, or computes the phantom. One of a single frame is refused. */
-export async function openImage(source: ImageSource): Promise<Volume> {
+/** Opens a 4D image: reads it from files, or computes the phantom. One of a single frame is refused, and one too large for `isSmall` files. */
+export async function openImage(source: ImageSource, isSmall = false): Promise<Volume> {
   if ('cine' in source) {
     const { dims, spacing, frames } = source.cine;
     return new Volume({
@@ -27,19 +27,25 @@ export async function openImage(source: ImageSource): Promise<Volume> {
       frameSeconds: CINE_SECONDS,
     });
   }
-  const image = await fromParts(groupFiles(source.files));
+  const image = await fromParts(groupFiles(source.files), isSmall);
   if (image.frames > 1) return image;
   image.free();
   throw new Refusal('invalid-argument', text('track.oneFrame'));
 }
 
-async function fromParts(parts: NamedBytes[][]): Promise<Volume> {
+async function fromParts(parts: NamedBytes[][], isSmall: boolean): Promise<Volume> {
   const [first] = parts;
   if (!first) throw new Refusal('bad-file', text('track.noHeader'));
-  if (parts.length === 1) return parseFiles(first);
+  const opened = async (files: NamedBytes[]) => {
+    const init = await readFiles(files);
+    const [x, y, z, frames = 1] = init.dims;
+    if (isSmall) checkSmallImage({ data: init.data, dims: [x, y, z, frames * parts.length] });
+    return new Volume(init);
+  };
+  if (parts.length === 1) return opened(first);
   const frames: Volume[] = [];
   try {
-    for (const files of parts) frames.push(await parseFiles(files));
+    for (const files of parts) frames.push(await opened(files));
     return Volume.fromFrames(frames);
   } finally {
     for (const frame of frames) frame.free();

@@ -8,7 +8,7 @@ import { Refusal, toFailure } from '../worker/refusal';
 import { logged, type RunLog, RunRecorder } from '../worker/run-log';
 import { type Handlers, sender, serve, Work, withTransfer } from '../worker/serving';
 import { transferOf } from '../worker/surface-buffers';
-import { checkSmallImage, displayOf, intensitiesOf, viewOf } from '../worker/volumes';
+import { displayOf, intensitiesOf, viewOf } from '../worker/volumes';
 import { type CineSpec, trueVolume } from './cine';
 import { programOf } from './code';
 import { trackForComparison } from './comparing';
@@ -101,14 +101,11 @@ class Session {
     await this.#pause();
     const tell = (what: string) => send({ event: 'preparing', what });
     const began = performance.now();
-    const original = await openImage(source);
+    const original = await openImage(source, isSmall);
     const spec = 'cine' in source ? source.cine : undefined;
     let made: Volume = original;
     try {
-      if (isSmall) {
-        checkSmallImage({ dims: [...original.dims, original.frames] });
-        checkSmall(original, setup.preparation);
-      }
+      if (isSmall) checkSmall(original, setup.preparation);
       made = prepare(original, setup.preparation, tell);
       const took = performance.now() - began;
       const ready = this.#adopt(made, setup, isSmall, saved);

@@ -1,5 +1,6 @@
 import { type Admission, admitted, notesOf } from '../importers';
 import type { NamedBytes } from '../protocol';
+import { areSmall } from '../small-files';
 import { text } from '../texts';
 import { h, uniqueId } from './dom';
 import { type Dropped, readFolders } from './folders';
@@ -123,6 +124,18 @@ export async function readFiles(files: File[]): Promise<NamedBytes[]> {
   const reason = refused.get(files);
   if (reason) throw reason;
   return Promise.all(files.map(readFile));
+}
+
+/** How files are read each time that they are opened: small ones are kept, so that they can be although they are gone. */
+export function reading(files: File[]): { load: () => Promise<{ files: NamedBytes[] }>; isKept: boolean } {
+  const isKept = areSmall(files);
+  let first: Promise<NamedBytes[]> | undefined;
+  const load = async () => {
+    if (!isKept) return { files: await readFiles(files) };
+    first ??= readFiles(files);
+    return { files: (await first).map((file) => ({ ...file, bytes: file.bytes.slice() })) };
+  };
+  return { load, isKept };
 }
 
 async function readFile(file: File): Promise<NamedBytes> {

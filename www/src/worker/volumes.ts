@@ -3,7 +3,7 @@ import { type LengthUnit, VesicleError, Volume, type VolumeInit } from 'vesicle'
 import startReaders, { parseVolume } from 'vesicle/import';
 import type { FileNotes, Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
 import { shapeVoxels } from '../shapes';
-import { beyondSmall, MOST_VOXELS_OF_SMALL } from '../small-files';
+import { beyondSmall, MOST_BYTES_OF_SMALL } from '../small-files';
 import { text } from '../texts';
 import { quantiles } from '../threshold';
 import { concerning, type Warning } from '../warnings';
@@ -27,14 +27,9 @@ function parseFile(file: NamedBytes): VolumeInit {
 }
 
 /**
- * Parses a volume from one file, or from a header and its data in either order; throws a `Refusal` for any other number
- * of files.
+ * Reads the voxels and the geometry of a volume from one file, or from a header and its data in either order; throws a
+ * `Refusal` for any other number of files.
  */
-export async function parseFiles(files: NamedBytes[]): Promise<Volume> {
-  return new Volume(await readFiles(files));
-}
-
-/** Reads the voxels and the geometry of a volume as {@link parseFiles} does, without making a volume of them. */
 export async function readFiles(files: NamedBytes[]): Promise<VolumeInit> {
   await startReaders();
   const [first, second] = files;
@@ -80,12 +75,13 @@ export function checkPlanes({ dims }: Pick<Volume, 'dims'>): void {
   throw new Refusal('too-large', beyondSmall('files.planesTooLarge', pixels, MOST_PIXELS_OF_SMALL));
 }
 
-/** Throws a `Refusal` if an image in small files has too many voxels, or planes with too many pixels, to be shown. */
-export function checkSmallImage({ dims: [x, y, z, frames = 1] }: Pick<VolumeInit, 'dims'>): void {
+/** Throws a `Refusal` if an image in small files has too many bytes of voxels, or planes with too many pixels, to be shown. */
+export function checkSmallImage({ dims: [x, y, z, frames = 1], data }: Pick<VolumeInit, 'dims' | 'data'>): void {
   checkPlanes({ dims: [x, y, z] });
-  const voxels = x * y * z * frames;
-  if (voxels <= MOST_VOXELS_OF_SMALL) return;
-  throw new Refusal('too-large', beyondSmall('files.tooManyVoxels', voxels, MOST_VOXELS_OF_SMALL));
+  const bytes = data.BYTES_PER_ELEMENT;
+  const [voxels, most] = [x * y * z * frames, MOST_BYTES_OF_SMALL / bytes];
+  if (voxels <= most) return;
+  throw new Refusal('too-large', beyondSmall('files.tooManyVoxels', voxels, most, { bits: 8 * bytes }));
 }
 
 /**
