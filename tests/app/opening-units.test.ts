@@ -35,8 +35,8 @@ class NameOpening extends Opening<Example, Linked, string, string> {
   readonly faults = new Map<string, Error>();
   /** Errors of data that cannot be read. */
   readonly unread = new Map<string, Error>();
-  /** Bytes of all data. */
-  bytes = 0;
+  /** Voxels of all data. */
+  voxels = 0;
   readonly #page: Page;
 
   constructor(page: Page) {
@@ -64,7 +64,7 @@ class NameOpening extends Opening<Example, Linked, string, string> {
     if (fault) throw fault;
     return data;
   };
-  protected override sizeOf = () => this.bytes;
+  protected override voxelsOf = () => this.voxels;
   protected async adopt(opened: string, source: AnySource): Promise<void> {
     this.#page.states.ready = true;
     this.#page.shown = `half ${opened}`;
@@ -127,7 +127,7 @@ test('what is open gives back its memory before other data are read, and is open
   const page = new Page();
   const opening = new NameOpening(page);
   opening.unread.set('bad', new RequestError({ code: 'bad-file', message: 'no image' }));
-  opening.bytes = 2 ** 25;
+  opening.voxels = 2 ** 25;
   await opening.files(files);
   expect(page.restarts).toBe(0);
   await opening.files([new File([], 'other')]);
@@ -140,10 +140,10 @@ test('what is open gives back its memory before other data are read, and is open
 test.each([
   ['light data', 'mine', 2 ** 20],
   ['data that are not kept, and may be gone', 'not kept', 2 ** 25],
-])('%s stay in the engine until others are open', async (_, name, bytes) => {
+])('%s stay in the engine until others are open', async (_, name, voxels) => {
   const page = new Page();
   const opening = new NameOpening(page);
-  opening.bytes = bytes;
+  opening.voxels = voxels;
   await opening.files([new File([], name)]);
   await opening.files([new File([], 'other')]);
   expect(page).toMatchObject({ shown: 'other', restarts: 0 });

@@ -181,8 +181,8 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     if (this.source) this.#ui.showFrame(this.source);
   }
 
-  protected override sizeOf({ volume }: OpenedVolume): number {
-    return volume.voxels.byteLength;
+  protected override voxelsOf({ volume }: OpenedVolume): number {
+    return volume.voxels.length;
   }
 
   override filesOf(source: ImageSource): NamedBytes[] {

@@ -12,8 +12,8 @@ import { LinkError, readLink } from './link-query';
 /** Milliseconds that a busy worker has to save its model before it is terminated because the user cancels. */
 const SAVE_TIMEOUT_MS = 300;
 
-/** Bytes of voxels beyond which what is open gives back its memory before other data are read. */
-const HEAVY = 2 ** 24;
+/** Voxels beyond which what is open gives back its memory before other data are read. */
+const HEAVY = 2 ** 22;
 
 /**
  * Data that a lab opens (an example, the user's files, or data of another lab), with all that is needed to open it
@@ -144,8 +144,8 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     return source;
   }
 
-  /** Returns the bytes of the voxels of what was opened; none by default. */
-  protected sizeOf(_opened: Opened): number {
+  /** Returns the number of voxels of what was opened; 0 by default. */
+  protected voxelsOf(_opened: Opened): number {
     return 0;
   }
 
@@ -358,7 +358,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       const before = this.#source;
       this.#source = this.sourceToRemember(source, opened, data);
       this.#modelMismatch = false;
-      this.#givesWay = (source.isKept ?? source.isMade ?? false) && this.sizeOf(opened) > HEAVY;
+      this.#givesWay = (source.isKept ?? source.isMade ?? false) && this.voxelsOf(opened) > HEAVY;
       if (!reopening) this.onReplaced();
       if (source.linked && source.linked === this.#awaiting) this.#awaiting = undefined;
       const adoption = this.adopt(opened, source, reopening);

@@ -61,8 +61,8 @@ export class SegmentOpening extends Opening<SegmentExample, LinkedSegment, Image
     return { name: nameOf(files), ...reading(files) };
   }
 
-  protected override sizeOf({ volume }: OpenedImage): number {
-    return volume.voxels.byteLength;
+  protected override voxelsOf({ volume }: OpenedImage): number {
+    return volume.voxels.length;
   }
 
   override filesOf({ files }: ImageSource): NamedBytes[] {

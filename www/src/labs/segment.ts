@@ -1,4 +1,5 @@
 import { RequestError, toFailure } from '../channel';
+import { release } from '../release';
 import { SegmentClient } from '../segment/client';
 import type { SegmentExample } from '../segment/examples';
 import { rgbOf } from '../segment/labels';
@@ -163,6 +164,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   /** Displays a newly opened volume and its labels; after a failure of the engine, with the list of labels as before. */
   #adopt(opened: OpenedImage, { name, example, linked, session }: SegmentSource, reopening: boolean): void {
     const { volume, voxels, params } = opened;
+    const before = [this.#volume?.voxels, this.#editing.voxels];
     this.states.ready = true;
     this.#volume = volume;
     this.ui.saving.name = example?.id ?? name;
@@ -179,6 +181,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
       this.ui.tools.set({ range: example?.range ?? [...volume.window] });
       this.ui.options.set({ ...INITIAL_VIEW, ...linked?.view });
     }
+    before.forEach(release);
     this.#applyTool(this.ui.tools.value);
     this.#showAll(opened);
   }
@@ -211,9 +214,11 @@ export class SegmentLab extends LabShell<SegmentExample> {
     this.states.load(text('labs.opening', { name }));
     try {
       const opened = await this.client.request('openLabels', { files: await readFiles(files) });
+      const before = this.#editing.voxels;
       this.ui.view.setVolume(volume, { dims: volume.dims, voxels: opened.voxels, ...NO_OVERLAYS });
       this.#forgetMask();
       this.#editing.adopt(volume, opened, []);
+      release(before);
       this.#applyTool(this.ui.tools.value);
       this.ui.data.setFact(MAP_FACT, opened.labelFile ?? name);
       this.#showAll(opened);

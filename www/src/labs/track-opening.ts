@@ -60,8 +60,8 @@ export class TrackOpening extends Opening<TrackExample, LinkedTrack, ImageSource
     return { name: nameOf(files), ...reading(files) };
   }
 
-  protected override sizeOf({ volume }: OpenedTrack): number {
-    return volume.voxels.byteLength;
+  protected override voxelsOf({ volume }: OpenedTrack): number {
+    return volume.voxels.length;
   }
 
   override filesOf(source: ImageSource): NamedBytes[] {

@@ -2,6 +2,7 @@
 import { type LengthUnit, VesicleError, Volume, type VolumeInit } from 'vesicle';
 import startReaders, { parseVolume } from 'vesicle/import';
 import type { FileNotes, Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } from '../protocol';
+import { release } from '../release';
 import { shapeVoxels } from '../shapes';
 import { beyondSmall, MOST_BYTES_OF_SMALL } from '../small-files';
 import { text } from '../texts';
@@ -75,12 +76,16 @@ export function checkPlanes({ dims }: Pick<Volume, 'dims'>): void {
   throw new Refusal('too-large', beyondSmall('files.planesTooLarge', pixels, MOST_PIXELS_OF_SMALL));
 }
 
-/** Throws a `Refusal` if an image in small files has too many bytes of voxels, or planes with too many pixels, to be shown. */
+/**
+ * Throws a `Refusal` if an image in small files has planes with too many pixels, or too many bytes of voxels, to be shown;
+ * these are given back.
+ */
 export function checkSmallImage({ dims: [x, y, z, frames = 1], data }: Pick<VolumeInit, 'dims' | 'data'>): void {
   checkPlanes({ dims: [x, y, z] });
   const bytes = data.BYTES_PER_ELEMENT;
   const [voxels, most] = [x * y * z * frames, MOST_BYTES_OF_SMALL / bytes];
   if (voxels <= most) return;
+  release(data);
   throw new Refusal('too-large', beyondSmall('files.tooManyVoxels', voxels, most, { bits: 8 * bytes }));
 }
 
