@@ -6,10 +6,11 @@
 //! mesh before.
 
 use super::decimate::Condition;
-use crate::math::{Vec3, triangle};
+use crate::math::{Bounds, Vec3, triangle};
 use crate::mesh::{Facet, Mesh, MeshError, VertexId};
 use crate::pauses::Pauses;
 use crate::spatial::TriangleTree;
+use smallvec::SmallVec;
 
 /// The vertices of the mesh before decimation, and their witnesses.
 pub(super) struct Deviation {
@@ -50,7 +51,20 @@ impl Deviation {
         }
         Ok(deviation)
     }
+
+    /// Returns a box with all points within the tolerance of a triangle.
+    fn around(&self, facet: &Facet) -> Bounds {
+        let Bounds { min, max } = Bounds::from_points(&facet.points);
+        let reach = self.tolerance as f32;
+        let largest = min.abs().max(max.abs()).max_element() + reach;
+        // More than the sums are rounded by, and the distances.
+        let margin = Vec3::splat(reach + ROUNDING * largest);
+        Bounds { min: min - margin, max: max + margin }
+    }
 }
+
+/// A bound of the rounding errors of sums of coordinates, relative to the largest.
+const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 impl Condition for Deviation {
     fn allows(&mut self, mesh: &Mesh, [u, v]: [VertexId; 2], position: Vec3, fresh: &[Facet]) -> bool {
@@ -59,15 +73,18 @@ impl Condition for Deviation {
         }
         self.found.clear();
         let reach = self.tolerance * self.tolerance;
+        let boxes: SmallVec<[Bounds; 24]> = fresh.iter().map(|facet| self.around(facet)).collect();
         for w in around(mesh, [u, v]) {
             self.tests += self.at[w.index()].len() as u64;
             for &point in &self.at[w.index()] {
                 if !is_removed(&self.witnesses[point as usize], [u, v]) {
                     continue;
                 }
-                let p = self.points[point as usize].as_dvec3();
-                let is_witness = |facet: &&Facet| triangle::distance_squared(facet.points, p) <= reach;
-                let Some(witness) = fresh.iter().find(is_witness) else { return false };
+                let p = self.points[point as usize];
+                let near = fresh.iter().zip(&boxes).filter(|(_, around)| around.contains(p));
+                let is_witness =
+                    |facet: &&Facet| triangle::distance_squared(facet.points, p.as_dvec3()) <= reach;
+                let Some(witness) = near.map(|(facet, _)| facet).find(is_witness) else { return false };
                 self.found.push((point, witness.corners));
             }
         }

@@ -420,23 +420,43 @@ impl Points {
         let lowest = distances - rounding;
         let excluded = bound.excludes(lowest, directions);
         for lane in (0..count).filter(|lane| excluded >> lane & 1 == 0) {
-            self.search_one(
-                &facets.copies_of(lane),
-                lane_of(lowest, lane),
-                vector_of(directions, lane),
-                lane_of(rounding, lane),
-            );
+            let bound = (lane_of(lowest, lane), vector_of(directions, lane));
+            let near = self.nearer_than(bound);
+            if near != 0 {
+                self.measure(near, &facets.copies_of(lane), bound, lane_of(rounding, lane));
+            }
         }
     }
 
-    /// Computes the distances from one triangle, given in four copies, and the bound for points at *v* from the centre:
-    /// `lowest` + `direction` · *v*.
+    /// Returns a mask of the fours with a point that may be nearer to a triangle than to those so far: no distance at *v*
+    /// from the centre is less than `lowest` + `direction` · *v*.
     #[inline]
-    fn search_one(&mut self, triangle: &Facets, lowest: f32x4, direction: Vectors, rounding: f32x4) {
+    fn nearer_than(&self, (lowest, direction): (f32x4, Vectors)) -> u32 {
+        let mut near = 0;
+        for (k, (&at, &distances)) in self.at.iter().zip(&self.distances).enumerate() {
+            // NaN is not excluded.
+            let excluded = (lowest + dot(at, direction)).simd_ge(distances);
+            near |= u32::from(!excluded.all()) << k;
+        }
+        near & ((1 << self.fours) - 1)
+    }
+
+    /// Computes the distances of the fours in a mask from one triangle, given in four copies, and its bound, as for
+    /// [`Self::nearer_than`].
+    #[inline]
+    fn measure(
+        &mut self,
+        mut near: u32,
+        triangle: &Facets,
+        (lowest, direction): (f32x4, Vectors),
+        rounding: f32x4,
+    ) {
         let (normal, height) = triangle.planes();
-        for k in 0..self.fours {
+        while near != 0 {
+            let k = near.trailing_zeros() as usize;
+            near &= near - 1;
             let (at, distances) = (self.at[k], self.distances[k]);
-            // No point of the triangle is nearer than its plane, either. NaN is not excluded.
+            // No point of the triangle is nearer than its plane, either.
             let excluded = (lowest + dot(at, direction)).simd_ge(distances)
                 | ((height + dot(at, normal)).abs() - rounding).simd_ge(distances);
             if !excluded.all() {
