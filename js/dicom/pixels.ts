@@ -155,9 +155,11 @@ const FREE_VOXELS = 2 ** 24;
 const VOXELS_PER_BYTE = 1000;
 /** Most bytes that a byte of RLE can stand for. */
 const RLE_RATIO = 64;
-/** Most parts of an image of JPEG 2000, which take time of its decoder, and most precincts, which take half a kilobyte each. */
+/** Most parts of an image of JPEG 2000, which take time of its decoder. */
 const MOST_TILES = 1024;
+/** Most precincts, which take half a kilobyte each, and packets, which take time and memory although they may be empty. */
 const MOST_PRECINCTS = 2 ** 16;
+const MOST_PACKETS = 2 ** 20;
 
 /** Throws `bad-file` unless a compressed image is as large as its file says, before a decoder allocates memory for it. */
 function checkSize({ format, file }: Frame, packed: Uint8Array): void {
@@ -169,17 +171,18 @@ function checkSize({ format, file }: Frame, packed: Uint8Array): void {
   if (isRle) return;
   const stated = statedSize(packed);
   if (!stated) throw badDicom(file.name, 'the compressed image could not be decoded: it states no size');
-  const { width, height, samples, tiles, precincts, problem } = stated;
+  const { width, height, samples, problem } = stated;
   if (problem) throw badDicom(file.name, problem);
   if (width !== columns || height !== rows || samples !== 1)
     throw badDicom(
       file.name,
       `the compressed image has ${width} × ${height} pixels of ${samples} samples, the file states ${columns} × ${rows} of 1`,
     );
-  if (!(tiles <= MOST_TILES))
-    throw badDicom(file.name, `the compressed image has ${tiles} tiles; at most ${MOST_TILES}`);
-  if (!(precincts <= MOST_PRECINCTS))
-    throw badDicom(file.name, `the compressed image has ${precincts} precincts; at most ${MOST_PRECINCTS}`);
+  const bounds = { tiles: MOST_TILES, precincts: MOST_PRECINCTS, packets: MOST_PACKETS };
+  for (const [parts, most] of Object.entries(bounds)) {
+    const count = stated[parts as keyof typeof bounds];
+    if (!(count <= most)) throw badDicom(file.name, `the compressed image has ${count} ${parts}; at most ${most}`);
+  }
 }
 
 /** Whether a compressed image has the marker that ends images of the JPEG family, before padding. */

@@ -10,6 +10,8 @@ export interface StatedSize {
   tiles: number;
   /** Number of precincts of JPEG 2000: parts of the levels of resolution. */
   precincts: number;
+  /** Number of packets of JPEG 2000: each layer of quality has one in each precinct. */
+  packets: number;
   /** Why the image is not decoded, whatever its size. */
   problem?: string | undefined;
 }
@@ -19,7 +21,8 @@ export function statedSize(bytes: Uint8Array): StatedSize | undefined {
   const at = startOfCodestream(bytes);
   if (at >= 0) return sizeOfCodestream(new DataView(bytes.buffer, bytes.byteOffset + at, bytes.length - at));
   const found = jpegSize(bytes);
-  return found && { ...found, tiles: 1, precincts: 1, problem: found.hasManyScans ? TOO_MANY_SCANS : undefined };
+  const problem = found?.hasManyScans ? TOO_MANY_SCANS : undefined;
+  return found && { ...found, tiles: 1, precincts: 1, packets: 1, problem };
 }
 
 /** Start of the codestream of JPEG 2000 and HTJ2K: the markers SOC and SIZ (ITU-T T.800, annex A). */
@@ -38,29 +41,40 @@ function sizeOfCodestream(view: DataView): StatedSize | undefined {
   if (view.byteLength < 45) return undefined;
   const [right = 0, bottom = 0, left = 0, top = 0] = [8, 12, 16, 20].map((at) => view.getUint32(at));
   const [wide = 0, high = 0, tileLeft = 0, tileTop = 0] = [24, 28, 32, 36].map((at) => view.getUint32(at));
-  const tiles = Math.ceil((right - tileLeft) / wide) * Math.ceil((bottom - tileTop) / high);
+  const tiles = [Math.ceil((right - tileLeft) / wide), Math.ceil((bottom - tileTop) / high)] as const;
   // Decoders wait without end for the rows that an image with fewer samples than pixels does not have.
   const [across, down] = [view.getUint8(43), view.getUint8(44)];
   const width = Math.ceil(right / across) - Math.ceil(left / across);
   const height = Math.ceil(bottom / down) - Math.ceil(top / down);
-  const counts = precinctSizes(view).map((sizes) => precinctsIn(width, height, sizes));
-  const precincts = counts.reduce((most, count) => Math.max(most, count), 0);
-  return { width, height, samples: view.getUint16(40), tiles, precincts };
+  const codings = codingsOf(view);
+  const most = (counts: number[]) => counts.reduce((most, count) => Math.max(most, count), 0);
+  const precincts = most(codings.map(({ sizes }) => precinctsIn([width, height], tiles, sizes)));
+  const packets = precincts * most(codings.map(({ layers }) => layers));
+  return { width, height, samples: view.getUint16(40), tiles: tiles[0] * tiles[1], precincts, packets };
 }
 
 /** Markers of a codestream: how all components are coded, how one is, and the start of a part of a tile. */
 const [COD, COC, SOT] = [0xff52, 0xff53, 0xff90];
 
-/** Returns the exponents of the precincts of each level, the coarsest first, as often as they are stated. */
-function precinctSizes(view: DataView): [number, number][][] {
-  const found: [number, number][][] = [];
+/** How an image is coded, or one of its components or tiles. */
+interface Coding {
+  /** Number of layers of quality; 0 if it is that of the other components. */
+  layers: number;
+  /** Exponents of the precincts of each level, the coarsest first. */
+  sizes: [number, number][];
+}
+
+/** Returns how an image is coded, as often as it is stated. */
+function codingsOf(view: DataView): Coding[] {
+  const found: Coding[] = [];
   let end = 0;
   for (let at = 2; at + 12 < view.byteLength; ) {
     const [marker, length] = [view.getUint16(at), view.getUint16(at + 2)];
     // A part of a tile states its length, after which the next one begins; 0 is that up to the end.
     if (marker === SOT) end = at + view.getUint32(at + 6);
-    if (marker === COD) found.push(precinctsAt(view, at + 9, view.getUint8(at + 4)));
-    if (marker === COC) found.push(precinctsAt(view, at + 6, view.getUint8(at + 5)));
+    if (marker === COD)
+      found.push({ layers: view.getUint16(at + 6), sizes: precinctsAt(view, at + 9, view.getUint8(at + 4)) });
+    if (marker === COC) found.push({ layers: 0, sizes: precinctsAt(view, at + 6, view.getUint8(at + 5)) });
     const isHeader = marker >= 0xff01 && marker !== 0xff93 && length >= 2;
     const next = isHeader ? at + 2 + length : end;
     if (next <= at) break;
@@ -81,10 +95,15 @@ function precinctsAt(view: DataView, at: number, style: number): [number, number
   });
 }
 
-/** Returns the number of precincts in all levels of an image. */
-function precinctsIn(width: number, height: number, sizes: readonly [number, number][]): number {
+/** Returns the number of precincts in all levels of an image, or somewhat more if it has several tiles, which may divide some. */
+function precinctsIn(
+  [width, height]: readonly [number, number],
+  [across, down]: readonly [number, number],
+  sizes: Coding['sizes'],
+): number {
   return sizes.reduce((sum, [wide, high], level) => {
     const coarser = sizes.length - 1 - level;
-    return sum + Math.ceil(width / 2 ** (coarser + wide)) * Math.ceil(height / 2 ** (coarser + high));
+    const [columns, rows] = [Math.ceil(width / 2 ** (coarser + wide)), Math.ceil(height / 2 ** (coarser + high))];
+    return sum + (columns + across - 1) * (rows + down - 1);
   }, 0);
 }

@@ -93,6 +93,18 @@ const refused = async (element: Element, size: Image, uid: string) => {
   return `${error.code} ${error.message}`;
 };
 
+/** Reads images whose codestream of JPEG 2000 has a size, tiles of another one, and a header, and returns why they are refused. */
+const refusedCodestream = (side: number, tile: [number, number], header: number[]) => {
+  const size = Buffer.alloc(43);
+  size.set([0xff, 0x51, 0, 41]);
+  [side, side, 0, 0, ...tile].forEach((value, k) => {
+    size.writeUInt32BE(value, 6 + 4 * k);
+  });
+  size.set([0, 1, 7, 1, 1], 38);
+  const codestream = Buffer.concat([Buffer.from([0xff, 0x4f]), size, Buffer.from(header), Buffer.alloc(60)]);
+  return refused(fragments([codestream]), { rows: side, columns: side }, '1.2.840.10008.1.2.4.90');
+};
+
 describe('files of very many', () => {
   test('frames are opened and read in little time', async () => {
     const { data } = await within(4, () => readDicom(file(image({ frames: 99_000 }))));
@@ -298,12 +310,6 @@ describe('compressed images', () => {
   });
 
   test('of JPEG 2000 with a precinct for each voxel, which would take gigabytes', async () => {
-    const size = Buffer.alloc(43);
-    size.set([0xff, 0x51, 0, 41]);
-    [2048, 2048, 0, 0, 2048, 2048].forEach((value, k) => {
-      size.writeUInt32BE(value, 6 + 4 * k);
-    });
-    size.set([0, 1, 7, 1, 1], 38);
     const coding = [0xff, 0x52, 0, 13, 1, 0, 0, 1, 0, 0, 4, 4, 0, 1];
     // In the main header, and in that of a part of a tile.
     const part = [0xff, 0x90, 0, 10, 0, 0, 0, 0, 0, 0, 0, 1];
@@ -311,11 +317,21 @@ describe('compressed images', () => {
       [...coding, 0],
       [...coding, 0xff, ...part, ...coding, 0],
     ]) {
-      const image = Buffer.concat([Buffer.from([0xff, 0x4f]), size, Buffer.from(header), Buffer.alloc(60)]);
-      const sides = { rows: 2048, columns: 2048 };
-      const text = await refused(fragments([image]), sides, '1.2.840.10008.1.2.4.90');
-      expect(text).toMatch(/has 4194304 precincts; at most 65536/);
+      expect(await refusedCodestream(2048, [2048, 2048], header)).toMatch(/has 4194304 precincts; at most 65536/);
     }
+  });
+
+  test('of JPEG 2000 with thousands of layers, each of which has a packet in each precinct', async () => {
+    const coding = (layers: number, exponents: number) => {
+      return [0xff, 0x52, 0, 13, 1, 0, layers >> 8, layers & 255, 0, 0, 4, 4, 0, 1, exponents, 0];
+    };
+    const one = refusedCodestream(512, [512, 512], coding(65_535, 0x44));
+    expect(await one).toMatch(/has 67107840 packets; at most 1048576/);
+    // Tiles divide precincts, of which there would be one.
+    const tiles = refusedCodestream(512, [512, 1], coding(60_000, 0xff));
+    expect(await tiles).toMatch(/has 30720000 packets; at most 1048576/);
+    // A few layers are decoded: this has no data.
+    expect(await refusedCodestream(512, [512, 512], coding(1023, 0x44))).not.toMatch(/packets/);
   });
 
   test('without an end are refused by JPEG-LS, whose decoder would search it for long', async () => {
