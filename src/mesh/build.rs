@@ -3,10 +3,14 @@
 use super::attributes::Attributes;
 use super::{MAX_VERTICES, Mesh, MeshError, Ring, TriangleMesh, VertexId};
 use crate::math::Vec3;
+use crate::math::order::sort_by_rank;
 
 /// The largest valence accepted by [`Mesh::from_triangles`]; rings are searched linearly, so that edits around a vertex
 /// of larger valence would be slow.
 const LARGEST_VALENCE: usize = 4096;
+
+/// The largest number of links around a vertex that are not sorted to find one.
+const SEARCHED_LINEARLY: usize = 32;
 
 impl Mesh {
     /// Creates a dynamic mesh from the positions and triangles of a closed, oriented, manifold triangle list. Unused
@@ -172,12 +176,24 @@ pub(super) fn ring_from_links(v: usize, links: &[[u32; 2]]) -> Result<Ring, Mesh
     let mut ring = Vec::with_capacity(links.len());
     let [first, mut here] = links[0];
     ring.push(VertexId(first));
+    let mut sorted = Vec::new();
+    if links.len() > SEARCHED_LINEARLY {
+        sorted.extend_from_slice(links);
+        // Of several links from a vertex, the first is found.
+        sort_by_rank(&mut sorted, |&[a, _]| u64::from(a));
+    }
     while here != first {
-        if ring.contains(&VertexId(here)) {
+        // Round and round, but not through the first.
+        if ring.len() > links.len() {
             return fail("an edge with more than two triangles, or inconsistent orientation,");
         }
         ring.push(VertexId(here));
-        match links.iter().find(|&&[a, _]| a == here) {
+        let link = if sorted.is_empty() {
+            links.iter().find(|&&[a, _]| a == here)
+        } else {
+            sorted.get(sorted.partition_point(|&[a, _]| a < here)).filter(|&&[a, _]| a == here)
+        };
+        match link {
             Some(&[_, next]) => here = next,
             None => return fail("a boundary, or inconsistent orientation,"),
         }

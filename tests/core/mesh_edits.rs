@@ -202,6 +202,37 @@ fn open_and_invalid_triangle_lists_are_refused_with_a_reason() {
     assert!(refusal(&bad, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]).contains("finite"));
 }
 
+/// The ring of a vertex with many triangles is found by another search.
+#[test]
+fn the_same_is_wrong_with_few_and_with_many_triangles_around_a_vertex() {
+    for n in [5, 500, 4095] {
+        let around = (0..n).map(|k| Vec3::new(k as f32, (k * k) as f32, 0.0));
+        let positions: Vec<Vec3> = [Vec3::Z, -Vec3::Z].into_iter().chain(around).collect();
+        let sides = |k: u32| (2 + k, 2 + (k + 1) % n as u32);
+        let bipyramid: Vec<[u32; 3]> =
+            (0..n as u32).flat_map(|k| [[0, sides(k).0, sides(k).1], [1, sides(k).1, sides(k).0]]).collect();
+        let built = |triangles: Vec<[u32; 3]>| {
+            Mesh::from_triangles(&TriangleMesh {
+                positions: positions.clone(),
+                triangles,
+                ..Default::default()
+            })
+        };
+        let mesh = built(bipyramid.clone()).unwrap();
+        assert_eq!((mesh.check(), mesh.triangle_count()), (Ok(()), 2 * n));
+        let refusal = |change: &dyn Fn(&mut Vec<[u32; 3]>)| {
+            let mut triangles = bipyramid.clone();
+            change(&mut triangles);
+            built(triangles).unwrap_err().to_string()
+        };
+        assert!(refusal(&|all| all.truncate(2 * n - 2)).contains("a boundary"));
+        assert!(refusal(&|all| all[4].swap(1, 2)).contains("orientation"));
+        // Joins the ring with itself, away from where it begins.
+        assert!(refusal(&|all| all[6] = [0, 5, 3]).contains("more than two triangles"));
+        assert!(refusal(&|all| all.push([0, 3, 5])).contains("duplicate"));
+    }
+}
+
 /// Regression: the slots of a component that was removed twice were free twice, and two vertices later shared one.
 #[test]
 fn a_component_is_removed_once() {
