@@ -364,8 +364,7 @@ function begun<Raw extends { free(): void }>(
   const known = checkProperties('options', given, OPTIONS) as MultiresOptions;
   const usual = known.detail && !known.base ? 'surface' : 'membrane';
   const holdsItself = choice('support', known.support ?? usual, SUPPORTS) === 'surface';
-  const ellipsoids = known.ellipsoids ?? (holdsItself ? [] : known.ellipsoids);
-  const packed = packedEllipsoids(ellipsoids as readonly ControlEllipsoid[]);
+  const packed = packedEllipsoids(known.ellipsoids ?? []);
   const params = shallowCopy('params', known.params ?? {});
   const handle = new Handle(NAME, () => {
     const [detail, base] = [triangles('detail', known.detail), triangles('base', known.base)];

@@ -164,6 +164,7 @@ function decodeWith(kind: string, module: DecoderModule): Decode {
       decoder.getEncodedBuffer(bytes.length).set(bytes);
       decoder.decode();
       const { bitsPerSample, componentCount } = decoder.getFrameInfo();
+      if (!componentCount) throw new Error('it is damaged, or none that the decoder knows');
       if (componentCount !== 1) throw new Error(`${componentCount} components instead of one`);
       // A copy, since the memory of the module is used again.
       const lossy = (decoder.getNearLossless?.() ?? 0) > 0 || decoder.getIsReversible?.() === false;

@@ -24,7 +24,7 @@ pub enum MethodError {
     /// The surface would exceed the largest number of vertices, since its edges are too short for its size or forces
     /// inflate it.
     #[error(
-        "the surface would have more than {most} vertices: use longer edges, a smaller volume or smaller ellipsoids, or forces that do not inflate it"
+        "the surface would have more than {most} vertices: use longer edges, a smaller object, or forces that do not inflate it"
     )]
     TooManyVertices {
         /// The largest number of vertices accepted for the surface.

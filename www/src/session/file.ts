@@ -103,11 +103,13 @@ export async function readSession(bytes: Uint8Array, unpacking: Unpack = unpack)
   const { format: _, version, parts: sums, ...body } = indexOf(strFromU8(packed));
   if (version > VERSION) throw new Error(text('sessions.newer', { version, known: VERSION }));
   const verified = await verify(new Map(Object.entries(parts)), sums);
+  const found = new Set<string>();
   const find = (name: string) => {
     const part = verified.get(name);
     if (!part) throw new Error(text('sessions.missingPart', { part: shown(name) }));
     // Each part stands for one array, so that a small file cannot become many.
-    verified.delete(name);
+    if (found.has(name)) throw new Error(text('sessions.repeatedPart', { part: shown(name) }));
+    found.add(name);
     return part;
   };
   return checked(decoded(body, find));
