@@ -358,7 +358,8 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       const before = this.#source;
       this.#source = this.sourceToRemember(source, opened, data);
       this.#modelMismatch = false;
-      this.#givesWay = (source.isKept ?? source.isMade ?? false) && this.voxelsOf(opened) > HEAVY;
+      const isKept = source.isKept || source.isMade || false;
+      this.#givesWay = isKept && this.voxelsOf(opened) > HEAVY;
       if (!reopening) this.onReplaced();
       if (source.linked && source.linked === this.#awaiting) this.#awaiting = undefined;
       const adoption = this.adopt(opened, source, reopening);
