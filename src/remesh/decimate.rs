@@ -248,9 +248,10 @@ impl<'a> Decimation<'a> {
         if self.mesh.can_collapse(u, v).is_err() {
             return;
         }
-        let Some(&(_, position)) = self.positions(u, v).get(choice as usize) else { return };
+        let positions = self.positions(u, v);
+        let Some(&(_, position)) = positions.get(choice as usize) else { return };
         if !self.is_safe(u, v, position) {
-            self.enqueue(u, v, choice + 1);
+            self.enqueue_at(&positions, u, v, choice + 1);
             return;
         }
         let quadric = self.quadrics[u.index()] + self.quadrics[v.index()];
@@ -270,7 +271,12 @@ impl<'a> Decimation<'a> {
 
     /// Queues the edge `uv` with the error of its candidate position number `choice`, if there is one.
     fn enqueue(&mut self, u: VertexId, v: VertexId, choice: u8) {
-        if let Some(&(error, _)) = self.positions(u, v).get(choice as usize) {
+        self.enqueue_at(&self.positions(u, v), u, v, choice);
+    }
+
+    /// Does what [`Self::enqueue`] does, given the candidate positions.
+    fn enqueue_at(&mut self, positions: &[RatedPosition], u: VertexId, v: VertexId, choice: u8) {
+        if let Some(&(error, _)) = positions.get(choice as usize) {
             let stamp = self.stamp(u, v);
             self.queue.push(Candidate { error: error.to_bits(), ends: [u, v], choice, stamp });
         }

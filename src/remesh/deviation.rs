@@ -21,6 +21,8 @@ pub(super) struct Deviation {
     witnesses: Vec<[u32; 3]>,
     /// The points whose witness has a vertex as its first corner, by its slot.
     at: Vec<Vec<u32>>,
+    /// A point for which a collapse at a vertex was not possible, by its slot: mostly, it is the reason the next time, too.
+    suspects: Vec<Option<u32>>,
     /// The points whose witnesses the collapse tested last removes, and their new ones.
     found: Vec<(u32, [u32; 3])>,
     /// The number of points tested so far, those whose witness is kept included.
@@ -39,6 +41,7 @@ impl Deviation {
             points: Vec::new(),
             witnesses: Vec::new(),
             at: vec![Vec::new(); mesh.slots()],
+            suspects: vec![None; mesh.slots()],
             found: Vec::new(),
             tests: 0,
         };
@@ -50,6 +53,16 @@ impl Deviation {
             }
         }
         Ok(deviation)
+    }
+
+    /// Returns the corners of the first of some triangles, which are in `boxes`, that can be the witness of a point.
+    fn witness(&self, point: u32, fresh: &[Facet], boxes: &[Bounds]) -> Option<[u32; 3]> {
+        let p = self.points[point as usize];
+        let reach = self.tolerance * self.tolerance;
+        let mut near =
+            fresh.iter().zip(boxes).filter(|(_, around)| around.contains(p)).map(|(facet, _)| facet);
+        let witness = near.find(|facet| triangle::distance_squared(facet.points, p.as_dvec3()) <= reach);
+        witness.map(|facet| facet.corners)
     }
 
     /// Returns a box with all points within the tolerance of a triangle.
@@ -68,27 +81,28 @@ const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 impl Condition for Deviation {
     fn allows(&mut self, mesh: &Mesh, [u, v]: [VertexId; 2], position: Vec3, fresh: &[Facet]) -> bool {
-        if !self.before.is_within(position, self.tolerance) {
-            return false;
-        }
-        self.found.clear();
-        let reach = self.tolerance * self.tolerance;
         let boxes: SmallVec<[Bounds; 24]> = fresh.iter().map(|facet| self.around(facet)).collect();
-        for w in around(mesh, [u, v]) {
-            self.tests += self.at[w.index()].len() as u64;
-            for &point in &self.at[w.index()] {
-                if !is_removed(&self.witnesses[point as usize], [u, v]) {
-                    continue;
-                }
-                let p = self.points[point as usize];
-                let near = fresh.iter().zip(&boxes).filter(|(_, around)| around.contains(p));
-                let is_witness =
-                    |facet: &&Facet| triangle::distance_squared(facet.points, p.as_dvec3()) <= reach;
-                let Some(witness) = near.map(|(facet, _)| facet).find(is_witness) else { return false };
-                self.found.push((point, witness.corners));
+        let is_removed = |point: u32| is_removed(&self.witnesses[point as usize], [u, v]);
+        for point in [u, v].into_iter().filter_map(|w| self.suspects[w.index()]) {
+            self.tests += 1;
+            if is_removed(point) && self.witness(point, fresh, &boxes).is_none() {
+                return false;
             }
         }
-        true
+        self.found.clear();
+        for w in around(mesh, [u, v]) {
+            self.tests += self.at[w.index()].len() as u64;
+            for &point in self.at[w.index()].iter().filter(|&&point| is_removed(point)) {
+                let Some(witness) = self.witness(point, fresh, &boxes) else {
+                    for end in [u, v] {
+                        self.suspects[end.index()] = Some(point);
+                    }
+                    return false;
+                };
+                self.found.push((point, witness));
+            }
+        }
+        self.before.is_within(position, self.tolerance)
     }
 
     fn adopt(&mut self, mesh: &Mesh, edge: [VertexId; 2]) {
