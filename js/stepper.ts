@@ -105,7 +105,8 @@ export class EventLoopYield {
 
   wait(): Promise<void> {
     return new Promise((resolve) => {
-      if (later) later(resolve);
+      // Twice, as the first may come before timers that are due: the caller may wait for one to abort.
+      if (later) later(() => later(resolve));
       if (!this.#channel) return;
       this.#channel.port1.onmessage = () => resolve();
       this.#channel.port2.postMessage(undefined);

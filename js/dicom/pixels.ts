@@ -153,6 +153,9 @@ function joined(file: Source, { byteArray }: DataSet, fragments: readonly Fragme
 /** Voxels of an image whose compressed bytes may be any, and more of them for each of these bytes. */
 const FREE_VOXELS = 2 ** 24;
 const VOXELS_PER_BYTE = 1000;
+/** The same for JPEG 2000, whose decoder may go through a voxel dozens of times. */
+const FREE_OF_JPEG_2000 = 2 ** 22;
+const OF_JPEG_2000_PER_BYTE = 64;
 /** Most bytes that a byte of RLE can stand for. */
 const RLE_RATIO = 64;
 /** Most parts of an image of JPEG 2000, which take time of its decoder. */
@@ -171,8 +174,14 @@ function checkSize({ format, file }: Frame, packed: Uint8Array): void {
   if (isRle) return;
   const stated = statedSize(packed);
   if (!stated) throw badDicom(file.name, 'the compressed image could not be decoded: it states no size');
-  const { width, height, samples, problem } = stated;
+  const { width, height, samples, problem, isCodestream } = stated;
   if (problem) throw badDicom(file.name, problem);
+  const mostOfJ2k = Math.max(FREE_OF_JPEG_2000, OF_JPEG_2000_PER_BYTE * packed.length);
+  if (isCodestream && rows * columns > mostOfJ2k)
+    throw badDicom(
+      file.name,
+      `${columns} × ${rows} voxels in ${packed.length} bytes of JPEG 2000 could take long; at most ${mostOfJ2k} are decoded`,
+    );
   if (width !== columns || height !== rows || samples !== 1)
     throw badDicom(
       file.name,

@@ -6,6 +6,8 @@ export interface StatedSize {
   width: number;
   height: number;
   samples: number;
+  /** Whether it is JPEG 2000, or HTJ2K. */
+  isCodestream: boolean;
   /** Number of parts that are decoded by themselves. */
   tiles: number;
   /** Number of precincts of JPEG 2000: parts of the levels of resolution. */
@@ -22,7 +24,7 @@ export function statedSize(bytes: Uint8Array): StatedSize | undefined {
   if (at >= 0) return sizeOfCodestream(new DataView(bytes.buffer, bytes.byteOffset + at, bytes.length - at));
   const found = jpegSize(bytes);
   const problem = found?.hasManyScans ? TOO_MANY_SCANS : undefined;
-  return found && { ...found, tiles: 1, precincts: 1, packets: 1, problem };
+  return found && { ...found, isCodestream: false, tiles: 1, precincts: 1, packets: 1, problem };
 }
 
 /** Start of the codestream of JPEG 2000 and HTJ2K: the markers SOC and SIZ (ITU-T T.800, annex A). */
@@ -50,7 +52,15 @@ function sizeOfCodestream(view: DataView): StatedSize | undefined {
   const most = (counts: number[]) => counts.reduce((most, count) => Math.max(most, count), 0);
   const precincts = most(codings.map(({ sizes }) => precinctsIn([width, height], tiles, sizes)));
   const packets = precincts * most(codings.map(({ layers }) => layers));
-  return { width, height, samples: view.getUint16(40), tiles: tiles[0] * tiles[1], precincts, packets };
+  return {
+    width,
+    height,
+    samples: view.getUint16(40),
+    isCodestream: true,
+    tiles: tiles[0] * tiles[1],
+    precincts,
+    packets,
+  };
 }
 
 /** Markers of a codestream: how all components are coded, how one is, and the start of a part of a tile. */

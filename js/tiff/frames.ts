@@ -3,8 +3,10 @@
 /** Marker of the header in JPEG-LS. */
 const LS = 0xf7;
 
-/** Marker of a scan, and how many there may be: decoders go through the whole image for each, of which it has some ten. */
-const [SCAN, MOST_SCANS] = [0xda, 20];
+/** Marker of a scan, of which an image has some ten at most: decoders go through the whole image for each. */
+const SCAN = 0xda;
+/** Most scans, and most pixels of all of them. */
+const [MOST_SCANS, MOST_SCANNED] = [20, 2 ** 28];
 
 export interface JpegSize {
   width: number;
@@ -14,7 +16,9 @@ export interface JpegSize {
 }
 
 /** Problem of a JPEG of very many scans. */
-export const TOO_MANY_SCANS = `a JPEG of more than ${MOST_SCANS} scans is not decoded: it would take long`;
+export const TOO_MANY_SCANS =
+  `a JPEG of more than ${MOST_SCANS} scans, or ${Math.floor(MOST_SCANNED / 1e6)} million pixels in all of them, ` +
+  'is not decoded: it would take long';
 
 /** Returns the size in the header of a JPEG; undefined if it has not exactly one. */
 export function jpegSize(bytes: Uint8Array): (JpegSize & { hasManyScans: boolean }) | undefined {
@@ -34,7 +38,9 @@ export function jpegSize(bytes: Uint8Array): (JpegSize & { hasManyScans: boolean
     at += hasLength ? 2 + view.getUint16(at + 2) : 1;
   }
   const [size] = found;
-  return size && found.length === 1 ? { ...size, hasManyScans: scans > MOST_SCANS } : undefined;
+  if (!size || found.length !== 1) return undefined;
+  const hasManyScans = scans > MOST_SCANS || scans * size.width * size.height > MOST_SCANNED;
+  return { ...size, hasManyScans };
 }
 
 /** Number at the start of a frame of Zstandard. */

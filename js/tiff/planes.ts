@@ -126,7 +126,8 @@ class PageReader {
     const bytes = numbers * new (arrayOf(type))(0).BYTES_PER_ELEMENT;
     if (bytes > LARGEST_BLOCK && compression !== 'none')
       throw tooLarge(this.#plane.page.label, `a compressed strip or tile has ${bytes} bytes; at most ${LARGEST_BLOCK}`);
-    return Math.min(TOGETHER, Math.max(1, Math.floor(BYTES_TOGETHER / bytes)));
+    // Decoders of JPEG take long, and let nothing happen meanwhile.
+    return compression === 'JPEG' ? 1 : Math.min(TOGETHER, Math.max(1, Math.floor(BYTES_TOGETHER / bytes)));
   }
 
   /** Returns the bytes of a block once they are decompressed. */

@@ -334,6 +334,14 @@ describe('compressed images', () => {
     expect(await refusedCodestream(512, [512, 512], coding(1023, 0x44))).not.toMatch(/packets/);
   });
 
+  test('of JPEG 2000 that are large for their bytes, of which each voxel may take a hundred steps', async () => {
+    const coding = [0xff, 0x52, 0, 12, 0, 0, 0, 1, 0, 0, 4, 4, 0, 1];
+    expect(await refusedCodestream(4090, [4090, 4090], coding)).toMatch(
+      /4090 × 4090 voxels in \d+ bytes of JPEG 2000 could take long; at most 4194304 are decoded/,
+    );
+    expect(await refusedCodestream(2048, [2048, 2048], coding)).not.toMatch(/could take long/);
+  });
+
   test('without an end are refused by JPEG-LS, whose decoder would search it for long', async () => {
     const bytes = new Uint8Array(readFileSync('tests/data/dicom/jpeg-ls.dcm'));
     bytes[bytes.lastIndexOf(0xd9)] = 0;
