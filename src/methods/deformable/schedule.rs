@@ -1,5 +1,6 @@
 //! Convergence of a pyramid level, and the descent to the next finer one (section 5.1, figures 12 and 13).
 
+use super::image::REDUCTION;
 use super::renewal::Renewal;
 use super::{DeformableModel, DeformableParams, Integrator, Topology, image_guide};
 use crate::mesh::VertexId;
@@ -312,9 +313,11 @@ impl DeformableModel {
         if times > 0 && vertices > most as u64 {
             return Err(MethodError::TooManyVertices { most });
         }
-        for _ in 0..times {
-            // If the mesh cannot be refined, edges that are too long on the finer level are split.
-            let sampling = Sampling::new(self.model_delta());
+        for time in 0..times {
+            // If the mesh cannot be refined, edges that are too long on the finer level are split. The sampling affects the
+            // speed and the memory of searches only.
+            let shorter = libm::pow(REDUCTION, f64::from(time)) as f32;
+            let sampling = Sampling::new(self.model_delta() / shorter);
             self.resolver.refine_in_slices(&mut self.mesh, sampling, pauses).await?;
         }
         Ok(())
