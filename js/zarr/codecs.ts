@@ -30,11 +30,16 @@ const DECODERS: Record<string, Decode> = {
 
 /** The most codecs of an array, those of the chunks in its shards included: a chunk is decoded by all of them in one go. */
 const MOST_CODECS = 8;
+/** The most that change the order of axes, as one by itself can: each makes a copy of the chunk. */
+const MOST_TRANSPOSED = 1;
 
 /** Throws `bad-file` for the metadata of an array with too many codecs. */
 export function checkCodecs(key: string, metadata: Uint8Array): void {
-  const count = codecsIn(parsed(metadata));
-  if (count > MOST_CODECS) throw badZarr(key, `must have at most ${MOST_CODECS} codecs, got ${count}`);
+  const names = codecsIn(parsed(metadata));
+  if (names.length > MOST_CODECS) throw badZarr(key, `must have at most ${MOST_CODECS} codecs, got ${names.length}`);
+  const transposed = names.filter((name) => name === 'transpose').length;
+  if (transposed > MOST_TRANSPOSED)
+    throw badZarr(key, `must have at most ${MOST_TRANSPOSED} codec 'transpose', got ${transposed}`);
 }
 
 /** Returns a value of JSON; undefined for what is none, of which zarrita says what is wrong. */
@@ -46,11 +51,11 @@ function parsed(bytes: Uint8Array): unknown {
   }
 }
 
-/** Returns the number of codecs of an array of Zarr 2 or 3, or of the configuration of a codec. */
-function codecsIn(value: unknown): number {
+/** Returns the names of the codecs of an array of Zarr 2 or 3, or of the configuration of a codec. */
+function codecsIn(value: unknown): unknown[] {
   const { codecs, index_codecs, filters } = Object(value) as Record<string, unknown>;
   const lists = [codecs, index_codecs, filters].filter((list) => Array.isArray(list));
-  return lists.flat().reduce((sum: number, codec) => sum + 1 + codecsIn(Object(codec).configuration), 0);
+  return lists.flat().flatMap((codec) => [Object(codec).name, ...codecsIn(Object(codec).configuration)]);
 }
 
 const bounded = new WeakSet<Registry>();

@@ -159,6 +159,17 @@ describe('decoders stop at the size of a chunk', () => {
     }
   });
 
+  test('that change the order of axes several times, each with a copy, are refused', async () => {
+    const transpose = { name: 'transpose', configuration: { order: [2, 1, 0] } };
+    const bytes = { name: 'bytes', configuration: { endian: 'little' } };
+    const shard = { chunk_shape: [4, 4, 4], codecs: [transpose, bytes], index_codecs: [bytes] };
+    const [twice, inShards] = [[transpose], [{ name: 'sharding_indexed', configuration: shard }]];
+    for (const codecs of [twice, inShards]) {
+      const error = await rejection(openZarr(new TestStore(image({ ...CUBE, order: [2, 1, 0], codecs }))));
+      expect(`${error.code} ${error.message}`).toMatch(/^bad-file .*must have at most 1 codec 'transpose', got 2/);
+    }
+  });
+
   test('for others that use the same zarrita, too, and only for what is larger', async () => {
     const voxels = Uint8Array.from({ length: 512 }, (_, index) => index);
     const store = withChunk({ ...CUBE, codecs: [gzip, gzip] }, gzipSync(gzipSync(voxels)));
