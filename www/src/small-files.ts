@@ -9,6 +9,9 @@ export const SMALL = 2 ** 17;
 /** Most bytes of the voxels of an image of small files: the page and its worker have some copies of them. */
 export const MOST_BYTES_OF_SMALL = 3 * 2 ** 24;
 
+/** Most bytes of decoded chunks that are kept of an image larger than memory: decoding takes several times as many. */
+export const CACHE_OF_SMALL = 2 ** 26;
+
 /** Most voxels of a 4D image of small files in Track, with slices between its own. */
 export const MOST_VOXELS_OF_SMALL = 2 ** 26;
 

@@ -5,6 +5,7 @@
 import init, { DeformableModel, type Volume } from 'vesicle/index';
 import { openZarr, type ZarrVolume } from 'vesicle/zarr';
 import type { LargeSource, Setup, VolumeView } from '../protocol';
+import { areSmall, CACHE_OF_SMALL } from '../small-files';
 import { text } from '../texts';
 import { modelOptions, withAttractors } from './models';
 import { Refusal } from './refusal';
@@ -26,7 +27,8 @@ export class LargeVolume {
   /** Opens an image, and reads its coarsest level. */
   static async open({ zarr }: LargeSource, signal: AbortSignal): Promise<LargeVolume> {
     await init();
-    const image = await openZarr(zarr, { signal });
+    const isSmall = zarr instanceof Blob && areSmall([zarr]);
+    const image = await openZarr(zarr, { signal, ...(isSmall && { cache: CACHE_OF_SMALL }) });
     try {
       const last = image.levels.length - 1;
       const max = image.levels[last]?.dims ?? [0, 0, 0];
