@@ -23,8 +23,8 @@ export interface SparseBox {
 
 /** Voxels in several resolutions, which are read when they are needed. */
 export interface SparseSource {
-  /** Size of each level, and its transform from voxel index to world, finest first. */
-  levels: { dims: Vec3; affine: Float64Array }[];
+  /** Size of each level, its transform from voxel index to world, and the voxels of its chunks, finest first. */
+  levels: { dims: Vec3; affine: Float64Array; chunks: Vec3 }[];
   /** Type of the voxels. */
   type: 'u8' | 'i8' | 'u16' | 'i16' | 'u32' | 'i32' | 'f32';
   /** Smallest and largest finite intensity of the coarsest level. */
@@ -67,7 +67,7 @@ export async function supply(
   insert: (box: SparseBox, voxels: VoxelArray) => void,
   { signal, onData }: DataOptions = {},
 ): Promise<void> {
-  const left = inOrder(boxes).values();
+  const left = inOrder(boxes, source).values();
   let waiting = boxes.length;
   await endingTogether(signal, (signal) => {
     const take = async () => {
@@ -83,12 +83,13 @@ export async function supply(
   });
 }
 
-/** Number of voxels along the edge of the blocks within which boxes are read together; that of common chunks. */
+/** Least number of voxels along the edge of the blocks within which boxes are read together. */
 const BLOCK = 128;
 
-/** Returns boxes ordered by level, then by the block that they begin in. */
-function inOrder(boxes: readonly SparseBox[]): SparseBox[] {
-  const block = (box: SparseBox, axis: 0 | 1 | 2) => Math.floor(box.min[axis] / BLOCK);
+/** Returns boxes ordered by level, then by the block that they begin in: a chunk, unless chunks are small. */
+function inOrder(boxes: readonly SparseBox[], { levels }: SparseSource): SparseBox[] {
+  const block = ({ level, min }: SparseBox, axis: 0 | 1 | 2) =>
+    Math.floor(min[axis] / Math.max(BLOCK, levels[level]?.chunks[axis] ?? 0));
   const compare = (one: SparseBox, other: SparseBox) =>
     one.level - other.level ||
     block(one, 2) - block(other, 2) ||
