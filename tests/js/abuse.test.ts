@@ -273,7 +273,7 @@ test('with memory nearly full, calls fail with a named error and succeed again o
       const data = new Uint8Array(bytes);
       for (;;) {
         try {
-          held.push(new Volume({ data, dims: [bytes, 1, 1] }));
+          held.push(new Volume({ data, dims: [1024, 1024, bytes / 2 ** 20] }));
         } catch (error) {
           return error;
         }
