@@ -93,7 +93,7 @@ const DEFAULT_BUDGET_MS = 12;
 
 const OPTIONS = ['signal', 'maxIterations', 'budgetMs', 'onStep'];
 
-/** Function of Node that calls another once timers and requests had their turn. */
+/** Function of Node that calls another once requests had their turn, and mostly timers. */
 const { setImmediate: later } = globalThis as { setImmediate?: (resolve: () => void) => void };
 
 /**

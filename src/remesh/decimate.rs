@@ -22,7 +22,7 @@ const POINT_WEIGHT: f64 = 1e-4;
 
 /// The highest valence of the vertex that remains after a collapse: vertices of higher valence are surrounded by
 /// needles, and the intersection test is quadratic in it.
-const MAX_NEIGHBOURS: usize = 24;
+pub(super) const MAX_NEIGHBOURS: usize = 24;
 
 /// The cosine of the largest angle by which one collapse may turn a triangle, 78°.
 const MIN_COSINE: f64 = 0.2;

@@ -5,7 +5,7 @@
 //! it removes have another one among the new triangles. The vertex that remains has to be within the tolerance of the
 //! mesh before.
 
-use super::decimate::Condition;
+use super::decimate::{Condition, MAX_NEIGHBOURS};
 use crate::math::{Bounds, Vec3, triangle};
 use crate::mesh::{Facet, Mesh, MeshError, VertexId};
 use crate::pauses::Pauses;
@@ -81,7 +81,8 @@ const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 impl Condition for Deviation {
     fn allows(&mut self, mesh: &Mesh, [u, v]: [VertexId; 2], position: Vec3, fresh: &[Facet]) -> bool {
-        let boxes: SmallVec<[Bounds; 24]> = fresh.iter().map(|facet| self.around(facet)).collect();
+        let boxes: SmallVec<[Bounds; MAX_NEIGHBOURS]> =
+            fresh.iter().map(|facet| self.around(facet)).collect();
         let is_removed = |point: u32| is_removed(&self.witnesses[point as usize], [u, v]);
         for point in [u, v].into_iter().filter_map(|w| self.suspects[w.index()]) {
             self.tests += 1;

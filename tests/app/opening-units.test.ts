@@ -33,7 +33,7 @@ class Page {
 class NameOpening extends Opening<Example, Linked, string, string> {
   protected readonly first = { id: 'first' };
   readonly faults = new Map<string, Error>();
-  /** Errors of data that cannot be read. */
+  /** Why data, by their names, are not loaded. */
   readonly unread = new Map<string, Error>();
   /** Voxels of all data. */
   voxels = 0;

@@ -313,10 +313,10 @@ impl DeformableModel {
         if times > 0 && vertices > most as u64 {
             return Err(MethodError::TooManyVertices { most });
         }
-        for time in 0..times {
+        for round in 0..times {
             // If the mesh cannot be refined, edges that are too long on the finer level are split. The sampling affects the
             // speed and the memory of searches only.
-            let shorter = libm::pow(REDUCTION, f64::from(time)) as f32;
+            let shorter = libm::pow(REDUCTION, f64::from(round)) as f32;
             let sampling = Sampling::new(self.model_delta() / shorter);
             self.resolver.refine_in_slices(&mut self.mesh, sampling, pauses).await?;
         }

@@ -9,7 +9,7 @@ import type { LabStates } from './lab-states';
 import type { Handoff } from './labs';
 import { LinkError, readLink } from './link-query';
 
-/** Milliseconds that a busy worker has to save its model before it is terminated because the user cancels. */
+/** Milliseconds that a busy worker has to save its model before it is terminated. */
 const SAVE_TIMEOUT_MS = 300;
 
 /** Voxels beyond which what is open gives back its memory before other data are read. */
@@ -291,7 +291,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   async cancel(): Promise<void> {
     const request = this.#requestCount;
     this.states.cancel(text('labs.cancelling'));
-    await Promise.race([this.saved(), later(SAVE_TIMEOUT_MS)]);
+    await this.#savedInTime();
     if (request !== this.#requestCount || this.states.value !== 'loading') return;
     this.states.engineBroken = true;
     const source = this.#source;
@@ -349,8 +349,8 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       // In turn, so that the worker ends up with the newest request, and never runs its model for an earlier one.
       await this.#loads;
       await this.#adoption;
-      if (request !== this.#requestCount) return;
       if (!reopening && !source.isChange) await this.#makeRoom();
+      if (request !== this.#requestCount) return;
       await this.#needEngine();
       const opened = await this.#load(source, data, reopening);
       if (request !== this.#requestCount) return;
@@ -440,8 +440,13 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    */
   async #makeRoom(): Promise<void> {
     if (!this.#givesWay) return;
-    await Promise.race([this.saved(), later(SAVE_TIMEOUT_MS)]);
+    await this.#savedInTime();
     this.states.engineBroken = true;
+  }
+
+  /** Settles when all pending saves of the model are complete, or take too long. */
+  #savedInTime(): Promise<unknown> {
+    return Promise.race([this.saved(), later(SAVE_TIMEOUT_MS)]);
   }
 
   /** Restarts the engine if it is broken. */

@@ -16,7 +16,10 @@ const CINE_SECONDS = 0.04;
 /** Digits of a proposed threshold, which is shown, and is in links and code: far finer than it could be chosen. */
 const THRESHOLD_DIGITS = 4;
 
-/** Opens a 4D image: reads it from files, or computes the phantom. One of a single frame is refused, and one too large for `isSmall` files. */
+/**
+ * Opens a 4D image: reads it from files, or computes the phantom. One of a single frame is refused; if its files are small,
+ * so is one of too many voxels.
+ */
 export async function openImage(source: ImageSource, isSmall = false): Promise<Volume> {
   if ('cine' in source) {
     const { dims, spacing, frames } = source.cine;

@@ -129,11 +129,13 @@ export async function readFiles(files: File[]): Promise<NamedBytes[]> {
 /** How files are read each time that they are opened: small ones are kept, so that they can be although they are gone. */
 export function reading(files: File[]): { load: () => Promise<{ files: NamedBytes[] }>; isKept: boolean } {
   const isKept = areSmall(files);
-  let first: Promise<NamedBytes[]> | undefined;
+  let kept: NamedBytes[] | undefined;
   const load = async () => {
-    if (!isKept) return { files: await readFiles(files) };
-    first ??= readFiles(files);
-    return { files: (await first).map((file) => ({ ...file, bytes: file.bytes.slice() })) };
+    const read = kept ?? (await readFiles(files));
+    if (!isKept) return { files: read };
+    kept = read;
+    // Copies, as they may be given to a worker.
+    return { files: read.map((file) => ({ ...file, bytes: file.bytes.slice() })) };
   };
   return { load, isKept };
 }
