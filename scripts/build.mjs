@@ -221,30 +221,35 @@ async function manifest(modules) {
  * where nothing changed. `quick`: the latter with one module, not optimised as a whole, in place of each other, unless the
  * others are there.
  */
-export async function build({ plain = true, quick = false } = {}) {
+export async function build(options) {
   const started = performance.now();
-  const sources = await sourceHash();
-  const areMade = await Promise.all(MODULES.map((module) => isMade(module, WAYS.release, sources)));
-  if (quick && areMade.includes(false)) await buildQuick(sources);
-  else await buildAll(plain && !quick ? [...MODULES, PLAIN] : MODULES, sources);
+  await assemble(await makeModules(options));
   const size = (await stat(at('pkg/vesicle_bg.wasm'))).size;
   say('pkg', `${Math.round(size / 1000)} kB of wasm, ${((performance.now() - started) / 1000).toFixed(1)} s`);
 }
 
-async function buildAll(modules, sources) {
+/** Makes the modules of `build`, and returns them. The quick ones need no npm package. */
+export async function makeModules({ plain = true, quick = false } = {}) {
+  const sources = await sourceHash();
+  const areMade = await Promise.all(MODULES.map((module) => isMade(module, WAYS.release, sources)));
+  if (quick && areMade.includes(false)) return makeQuick(sources);
+  return makeAll(plain && !quick ? [...MODULES, PLAIN] : MODULES, sources);
+}
+
+async function makeAll(modules, sources) {
   await Promise.all(modules.map((module) => make(module, WAYS.release, sources)));
   if (modules.includes(PLAIN)) await compareGlue();
-  await assemble(modules);
+  return modules;
 }
 
 /** The whole library stands in for its parts, which have the same classes. */
-async function buildQuick(sources) {
+async function makeQuick(sources) {
   for (const module of [WHOLE, READERS]) await make(module, WAYS.quick, sources);
   for (const module of METHOD_MODULES) {
     await rm(folder(module), { recursive: true, force: true });
     await cp(folder(WHOLE), folder(module), { recursive: true });
   }
-  await assemble(MODULES);
+  return MODULES;
 }
 
 if (startedAs(import.meta.url)) {
