@@ -241,7 +241,7 @@ impl TriangleMesh {
 
     /// Returns for each vertex the edges opposite it in its triangles, in the order of the triangles; each is directed
     /// as in its triangle.
-    pub(super) fn opposite_edges(&self) -> Groups<[u32; 2]> {
+    pub(crate) fn opposite_edges(&self) -> Groups<[u32; 2]> {
         let around = |&[a, b, c]: &[u32; 3]| [(a, [b, c]), (b, [c, a]), (c, [a, b])];
         Groups::new(self.positions.len(), self.triangles.iter().flat_map(around))
     }

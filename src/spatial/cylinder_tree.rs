@@ -1,6 +1,6 @@
 //! Triangles in a hierarchy of flat cylinders.
 
-use super::four_triangles::FourTriangles;
+use super::four_triangles::{Facet, FourTriangles};
 use crate::math::{Bounds, BoxTree, BoxTreeBuilder, DVec3, Vec3, triangle};
 use crate::pauses::Pauses;
 use std::ops::Range;
@@ -26,8 +26,8 @@ pub(super) struct CylinderTree {
 
 impl CylinderTree {
     /// Builds the tree, and pauses meanwhile.
-    pub(super) async fn new(triangles: &[[Vec3; 3]], pauses: &Pauses) -> Self {
-        let bounds: Vec<_> = triangles.iter().map(|c| Bounds::from_points(c)).collect();
+    pub(super) async fn new(triangles: &[Facet], pauses: &Pauses) -> Self {
+        let bounds: Vec<_> = triangles.iter().map(|facet| Bounds::from_points(&facet.corners)).collect();
         let mut builder = BoxTreeBuilder::new(&bounds);
         let mut built = 0;
         while let Some(triangles) = builder.advance() {
@@ -39,7 +39,8 @@ impl CylinderTree {
             }
         }
         let boxes = builder.finish();
-        let corners: Vec<_> = boxes.order().map(|t| triangles[t as usize]).collect();
+        let facets: Vec<_> = boxes.order().map(|t| triangles[t as usize]).collect();
+        let corners: Vec<_> = facets.iter().map(|facet| facet.corners).collect();
         let (mut cylinders, mut leaves_before, mut leaves) = (Vec::new(), Vec::new(), Vec::new());
         let mut enclosed = 0;
         for node in 0..boxes.node_count() {
@@ -47,7 +48,7 @@ impl CylinderTree {
             cylinders.push(Cylinder::around(boxes.node_bounds(node), own));
             leaves_before.push(leaves.len() as u32);
             if boxes.children(node).is_none() {
-                leaves.push(FourTriangles::new(own));
+                leaves.push(FourTriangles::new(&facets[boxes.node_range(node)]));
             }
             enclosed += own.len();
             if enclosed >= TRIANGLES_PER_UNIT {
@@ -160,7 +161,7 @@ mod tests {
     fn cylinders_bound_their_triangles() {
         let mut random = Random::new(2);
         for mesh in [torus(3.0, 1.0, 14, 8), soup(4, 60, 5)] {
-            let triangles: Vec<_> = mesh.corners().collect();
+            let triangles: Vec<_> = mesh.corners().map(Facet::alone).collect();
             let tree = finished(CylinderTree::new(&triangles, &Pauses::default()));
             assert_eq!(tree.triangles_of(0).len(), triangles.len());
             for node in 0..tree.cylinders.len() {
@@ -188,8 +189,8 @@ mod tests {
     #[test]
     fn the_middle_of_a_ball_is_far_from_all_cylinders() {
         let ball = crate::mesh::Mesh::icosphere(Vec3::ZERO, 1.0, 0.04).unwrap().to_triangles();
-        let corners: Vec<_> = ball.corners().collect();
-        let tree = finished(CylinderTree::new(&corners, &Pauses::default()));
+        let facets: Vec<_> = ball.corners().map(Facet::alone).collect();
+        let tree = finished(CylinderTree::new(&facets, &Pauses::default()));
         let small = (0..tree.cylinders.len()).filter(|node| tree.triangles_of(*node).len() <= 32);
         for distance in small.map(|node| tree.cylinder(node).offset(DVec3::ZERO).length()) {
             assert!(distance > 0.97, "{distance}");

@@ -9,6 +9,12 @@ pub(super) type Vectors = [f32x4; 3];
 /// Squared sine of the largest angle of a triangle below which rounding hides on which side of an edge a point is.
 const THIN: f32 = 1e-3;
 
+/// Rounding errors of barycentric coordinates, relative to the distance from the triangle over its height.
+const ROUNDING: f32 = 1e-5;
+
+/// The least sine of the angle by which a triangle is beyond another one along a direction.
+const LEAST_RISE: f32 = 1e-4;
+
 /// Returns four copies of a vector.
 #[inline]
 pub(super) fn splat(v: Vec3) -> Vectors {
@@ -47,6 +53,14 @@ pub(super) fn vector_of(v: Vectors, lane: usize) -> Vectors {
     [lane_of(v[0], lane), lane_of(v[1], lane), lane_of(v[2], lane)]
 }
 
+/// A triangle and those next to it.
+#[derive(Clone, Copy)]
+pub(super) struct Facet {
+    pub(super) corners: [Vec3; 3],
+    /// For each corner, that of the triangle beyond the edge opposite; the corner itself if there is none.
+    pub(super) beyond: [Vec3; 3],
+}
+
 /// Up to four triangles, the first repeated if there are fewer.
 #[derive(Clone, Copy)]
 pub(super) struct FourTriangles {
@@ -54,14 +68,17 @@ pub(super) struct FourTriangles {
     corner: Vectors,
     /// The edges from there.
     edges: [Vectors; 2],
+    /// The unit vectors to the corners from those of the triangles beyond the edges opposite; 0 if there are none.
+    from_beyond: [Vectors; 3],
 }
 
 impl FourTriangles {
     /// Returns up to four triangles; `None` if one is too thin for closest points in single precision.
-    pub(super) fn new(triangles: &[[Vec3; 3]]) -> Option<Self> {
-        let mut lanes = [[[0.0; 4]; 3]; 3];
+    pub(super) fn new(triangles: &[Facet]) -> Option<Self> {
+        let mut lanes = [[[0.0; 4]; 3]; 6];
         for lane in 0..4 {
-            let [a, b, c] = from_largest_angle(*triangles.get(lane).or(triangles.first())?);
+            let Facet { corners: [a, b, c], beyond } =
+                triangles.get(lane).or(triangles.first())?.from_largest_angle();
             let edges = [b - a, c - a];
             let sizes = edges[0].length_squared() * edges[1].length_squared();
             let cosine = edges[0].dot(edges[1]);
@@ -69,12 +86,14 @@ impl FourTriangles {
             if !(sizes - cosine * cosine > THIN * sizes && sizes > f32::MIN_POSITIVE / f32::EPSILON) {
                 return None;
             }
-            for (out, v) in lanes.iter_mut().zip([a, edges[0], edges[1]]) {
+            let [from_a, from_b, from_c] =
+                [a - beyond[0], b - beyond[1], c - beyond[2]].map(Vec3::normalize_or_zero);
+            for (out, v) in lanes.iter_mut().zip([a, edges[0], edges[1], from_a, from_b, from_c]) {
                 (out[0][lane], out[1][lane], out[2][lane]) = (v.x, v.y, v.z);
             }
         }
-        let [corner, first, second] = lanes.map(|vectors| vectors.map(f32x4::new));
-        Some(Self { corner, edges: [first, second] })
+        let [corner, first, second, from_beyond @ ..] = lanes.map(|vectors| vectors.map(f32x4::new));
+        Some(Self { corner, edges: [first, second], from_beyond })
     }
 
     /// Prepares the triangles for closest points to points near `origin`, which is the sum of two vectors, for more
@@ -88,15 +107,27 @@ impl FourTriangles {
     }
 }
 
-/// Returns the corners in their cyclic order, that with the largest angle first.
-fn from_largest_angle([a, b, c]: [Vec3; 3]) -> [Vec3; 3] {
-    let [at_a, at_b, at_c] = [b.distance_squared(c), c.distance_squared(a), a.distance_squared(b)];
-    if at_a >= at_b && at_a >= at_c {
-        [a, b, c]
-    } else if at_b >= at_c {
-        [b, c, a]
-    } else {
-        [c, a, b]
+impl Facet {
+    #[cfg(test)]
+    pub(super) fn alone(corners: [Vec3; 3]) -> Self {
+        Self { corners, beyond: corners }
+    }
+
+    /// Returns the triangle with its corners in their cyclic order, that with the largest angle first.
+    fn from_largest_angle(&self) -> Self {
+        let [a, b, c] = self.corners;
+        let [at_a, at_b, at_c] = [b.distance_squared(c), c.distance_squared(a), a.distance_squared(b)];
+        let mut turned = *self;
+        let turns = if at_a >= at_b && at_a >= at_c {
+            0
+        } else if at_b >= at_c {
+            1
+        } else {
+            2
+        };
+        turned.corners.rotate_left(turns);
+        turned.beyond.rotate_left(turns);
+        turned
     }
 }
 
@@ -144,6 +175,37 @@ impl Facets {
         (normals, -dot(self.a, normals))
     }
 
+    /// Returns a mask of the triangles that are not closer to any point of a block than a triangle beyond one of their edges,
+    /// as the whole block is beyond that edge, too. The block is around the origin, given by the vectors to the middles of
+    /// three sides. Of triangles that would exclude each other, the one further along `direction` is kept; 0 excludes none.
+    #[inline]
+    pub(super) fn beyond_edges(
+        &self,
+        triangles: &FourTriangles,
+        half_axes: &[Vectors; 3],
+        direction: Vectors,
+    ) -> u32 {
+        let Self { a, ab, ac, bb, bc, cc, inverse } = *self;
+        // The barycentric coordinates of the corners b and c are linear: their gradients, and the values at the origin.
+        let at_b = scaled(difference(scaled(ab, cc), scaled(ac, bc)), inverse);
+        let at_c = scaled(difference(scaled(ac, bb), scaled(ab, bc)), inverse);
+        let at_a = scaled([at_b[0] + at_c[0], at_b[1] + at_c[1], at_b[2] + at_c[2]], f32x4::splat(-1.0));
+        let (v, w) = (-dot(a, at_b), -dot(a, at_c));
+        let values = [f32x4::ONE - v - w, v, w];
+        let rounding = self.reach() * f32x4::splat(ROUNDING);
+        let mut excluded = f32x4::ZERO;
+        let is_acute = bc.simd_ge(f32x4::ZERO);
+        for (k, gradient) in [at_a, at_b, at_c].into_iter().enumerate() {
+            let change = half_axes.iter().fold(f32x4::ZERO, |sum, axis| sum + dot(*axis, gradient).abs());
+            let highest = values[k] + change + rounding * length(gradient);
+            let is_lower = dot(triangles.from_beyond[k], direction).simd_lt(f32x4::splat(-LEAST_RISE));
+            let is_beyond = highest.simd_lt(f32x4::ZERO) & is_lower;
+            // From beyond a side of an obtuse angle, the other side may be closer.
+            excluded = excluded | if k == 0 { is_beyond } else { is_beyond & is_acute };
+        }
+        excluded.to_bitmask()
+    }
+
     /// Returns the vector to each of four points from the closest point of its triangle.
     #[inline]
     pub(super) fn offsets(&self, points: Vectors) -> Vectors {
@@ -187,7 +249,7 @@ mod tests {
         let mut thin = 0;
         for round in 0..2000 {
             let triangles = [(); 4].map(|()| [vector(1.0), vector(1.0), vector(1.0)]);
-            let Some(four) = FourTriangles::new(&triangles[..1 + round % 4]) else {
+            let Some(four) = FourTriangles::new(&triangles.map(Facet::alone)[..1 + round % 4]) else {
                 thin += 1;
                 continue;
             };
@@ -218,10 +280,10 @@ mod tests {
         for corners in
             [[x, x, x], [x, y, 0.5 * (x + y)], [x, y, 0.497 * (x + y)], [1e-12 * x, 1e-12 * y, Vec3::ZERO]]
         {
-            assert!(FourTriangles::new(&[[Vec3::ZERO, x, y], corners]).is_none());
+            assert!(FourTriangles::new(&[[Vec3::ZERO, x, y], corners].map(Facet::alone)).is_none());
         }
         // A short edge does no harm.
-        assert!(FourTriangles::new(&[[1e-3 * x, 100.0 * y, Vec3::ZERO]]).is_some());
+        assert!(FourTriangles::new(&[Facet::alone([1e-3 * x, 100.0 * y, Vec3::ZERO])]).is_some());
         assert!(FourTriangles::new(&[]).is_none());
     }
 }

@@ -12,8 +12,9 @@
 
 use super::cylinder_tree::CylinderTree;
 use super::four_triangles::{
-    Facets, FourTriangles, Vectors, difference, dot, lane_of, length, scaled, splat, vector_of,
+    Facet, Facets, FourTriangles, Vectors, difference, dot, lane_of, length, scaled, splat, vector_of,
 };
+use crate::math::order::{combined_rank, rank_f32, sort_ranks};
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
 use crate::pauses::Pauses;
@@ -43,9 +44,7 @@ pub async fn lattice_distances(
     mesh.validate()?;
     let lattice = Block { start: [0; 3], size: dims };
     let [shrink, grow] = scale(mesh, &lattice, map);
-    let triangles: Vec<_> =
-        mesh.corners().map(|corners| corners.map(|p| (p.as_dvec3() * shrink).as_vec3())).collect();
-    let tree = CylinderTree::new(&triangles, pauses).await;
+    let tree = CylinderTree::new(&facets(mesh, shrink), pauses).await;
     let map = DAffine3 { matrix3: map.matrix3 * shrink, translation: map.translation * shrink };
     let candidates = vec![Candidate { node: 0, distance: 0.0, direction: DVec3::ZERO }];
     let mut search = Search { tree: &tree, map, dims, grow, out, candidates };
@@ -59,6 +58,26 @@ pub async fn lattice_distances(
         }
     }
     Ok(())
+}
+
+/// Returns the triangles of a mesh with their neighbours, scaled.
+fn facets(mesh: &TriangleMesh, scale: f64) -> Vec<Facet> {
+    let links = mesh.opposite_edges();
+    let scaled = |v: u32| (mesh.positions[v as usize].as_dvec3() * scale).as_vec3();
+    // Returns the corner of the triangle beyond the edge from `b` to `c`.
+    let beyond = |b: u32, c: u32| {
+        let [at_b, at_c] = [b, c].map(|v| links.of(v as usize));
+        if at_b.len() <= at_c.len() {
+            at_b.iter().find(|link| link[1] == c).map(|link| link[0])
+        } else {
+            at_c.iter().find(|link| link[0] == b).map(|link| link[1])
+        }
+    };
+    let facet = |&[a, b, c]: &[u32; 3]| Facet {
+        corners: [a, b, c].map(scaled),
+        beyond: [(a, b, c), (b, c, a), (c, a, b)].map(|(a, b, c)| scaled(beyond(b, c).unwrap_or(a))),
+    };
+    mesh.triangles.iter().map(facet).collect()
 }
 
 /// The exponent of two to which coordinates are scaled, so that products of four of them are within the range of
@@ -383,20 +402,19 @@ impl Points {
     /// meanwhile.
     async fn search(mut self, search: &mut Search<'_>, begin: usize, bound: &UpperBound, pauses: &Pauses) {
         let packed_bound = PackedBound::new(bound);
-        let candidates = &mut search.candidates[begin..];
         // The nearest first, so that most others are excluded.
-        let nearer = |a: usize, b: usize| if candidates[b].distance < candidates[a].distance { b } else { a };
-        if let Some(first) = (0..candidates.len()).reduce(nearer) {
-            candidates.swap(0, first);
-        }
-        for some in candidates.chunks(CANDIDATES_AT_ONCE) {
-            for candidate in some {
-                match search.tree.packed(candidate.node) {
+        let rank = |(candidate, k): (&Candidate, u32)| combined_rank(rank_f32(candidate.distance as f32), k);
+        let mut ranks: Vec<_> = search.candidates[begin..].iter().zip(0..).map(rank).collect();
+        sort_ranks(&mut ranks);
+        for some in ranks.chunks(CANDIDATES_AT_ONCE) {
+            for rank in some {
+                let leaf = search.candidates[begin + *rank as u32 as usize].node;
+                match search.tree.packed(leaf) {
                     Some(triangles) => {
-                        let count = search.tree.triangles_of(candidate.node).len();
+                        let count = search.tree.triangles_of(leaf).len();
                         self.search_packed(triangles, count, &packed_bound);
                     }
-                    None => self.search_thin(search.tree, candidate.node, bound),
+                    None => self.search_thin(search.tree, leaf, bound),
                 }
             }
             pauses.after(some.len() / LEAVES_PER_UNIT).await;
@@ -418,7 +436,10 @@ impl Points {
         // Errors of the direction count more, the farther the points are from the centre.
         let rounding = facets.reach() * (f32x4::ONE + bound.radius * inverse) * f32x4::splat(ROUNDING);
         let lowest = distances - rounding;
-        let excluded = bound.excludes(lowest, directions);
+        let mut excluded = bound.excludes(lowest, directions);
+        if excluded != 0b1111 {
+            excluded |= facets.beyond_edges(triangles, &bound.half_axes, bound.direction);
+        }
         for lane in (0..count).filter(|lane| excluded >> lane & 1 == 0) {
             let bound = (lane_of(lowest, lane), vector_of(directions, lane));
             let near = self.nearer_than(bound);
@@ -601,6 +622,48 @@ mod tests {
     fn far_points_have_the_distance_of_the_closest_of_even_and_of_uneven_triangles() {
         check_far_points(0.0);
         check_far_points(0.4);
+    }
+
+    /// What is left without the triangles that are no closer than their neighbours has the same distance, at all corners of
+    /// random blocks.
+    #[test]
+    fn no_closest_triangle_is_excluded_for_one_beyond_its_edges() {
+        let mut random = Random::new(12);
+        let mut mesh = Mesh::icosphere(Vec3::ZERO, 2.0, 0.4).unwrap().to_triangles();
+        // Flat and steep, with acute and obtuse angles.
+        for p in &mut mesh.positions {
+            *p += Vec3::from([(); 3].map(|()| 0.3 * random.unit() as f32));
+        }
+        let facets = facets(&mesh, 1.0);
+        let (mut excluded, mut all) = (0, 0);
+        for _ in 0..200 {
+            let centre = DVec3::from([(); 3].map(|()| 8.0 * random.unit() - 4.0));
+            let half_axes = [(); 3].map(|()| DVec3::from([(); 3].map(|()| 0.2 * random.unit() - 0.1)));
+            let inner = DVec3::from([(); 3].map(|()| 2.0 * random.unit() - 1.0));
+            let bound = PackedBound::new(&UpperBound::new(half_axes, centre - inner));
+            let is_left = |facet: &&Facet| {
+                let four = FourTriangles::new(&[**facet]);
+                four.is_none_or(|four| {
+                    let around = four.around([splat(centre.as_vec3()), splat(Vec3::ZERO)]);
+                    around.beyond_edges(&four, &bound.half_axes, bound.direction) & 1 == 0
+                })
+            };
+            let left: Vec<_> = facets.iter().filter(is_left).collect();
+            excluded += facets.len() - left.len();
+            all += facets.len();
+            for k in 0..8 {
+                let signs = [1, 2, 4].map(|bit| if k & bit == 0 { 1.0 } else { -1.0 });
+                let p = centre + (0..3).map(|axis| half_axes[axis] * signs[axis]).sum::<DVec3>();
+                let nearest = |of: &[&Facet]| {
+                    of.iter()
+                        .map(|facet| triangle::distance_squared(facet.corners, p))
+                        .fold(f64::INFINITY, f64::min)
+                };
+                let [whole, rest] = [&facets.iter().collect::<Vec<_>>()[..], &left].map(nearest);
+                assert!(rest.sqrt() <= whole.sqrt() + 1e-6, "{rest} {whole} at {p}");
+            }
+        }
+        assert!(2 * excluded > all, "{excluded} of {all}");
     }
 
     /// Where thousands of triangles are nearly the closest, a block takes as long as thousands do elsewhere.
