@@ -6,8 +6,11 @@ use crate::mesh::{Mesh, MeshError, OppositeVertices, TriangleMesh, VertexId, int
 use crate::spatial::lone_corner;
 use std::collections::BTreeMap;
 
-/// The number of positions of the plane that are tried.
-const ATTEMPTS: u32 = 24;
+/// The number of positions of the plane that are tried, of all and at least of large meshes, and the most triangles that are
+/// cut in all attempts beyond these.
+const ATTEMPTS: usize = 24;
+const LEAST_ATTEMPTS: usize = 4;
+const TRIANGLES_CUT: usize = 500_000;
 
 /// The least distance of vertices from the plane, relative to the largest coordinate: 16 units in the last place.
 /// Triangles cut nearer to a corner than some of these may degenerate when positions are rounded; with more, few
@@ -52,7 +55,9 @@ pub fn cut_by_plane(mesh: &mut Mesh, plane: Plane) -> Result<(), MeshError> {
     let is_clear = |offset: &&f64| present().all(|height| (height - **offset).abs() >= margin);
     // In a very fine mesh no position is clear; then those near the given one may do as well.
     let clear = offsets.iter().filter(is_clear);
-    for offset in clear.chain(&offsets[..2]) {
+    // Most cuts of large meshes that fail do so since these intersect themselves.
+    let attempts = (TRIANGLES_CUT / mesh.triangle_count().max(1)).clamp(LEAST_ATTEMPTS, ATTEMPTS);
+    for offset in clear.take(attempts - 2).chain(&offsets[..2]) {
         let heights: Vec<f64> = heights.iter().map(|height| height - offset).collect();
         if let Some(cut) = cut_at(mesh, &heights, plane.normal) {
             let replaced = std::mem::replace(mesh, cut);
@@ -66,7 +71,7 @@ pub fn cut_by_plane(mesh: &mut Mesh, plane: Plane) -> Result<(), MeshError> {
 /// Returns the displacements of the plane that are tried, on both sides by turns.
 fn offsets(margin: f64) -> impl Iterator<Item = f64> {
     (0..ATTEMPTS).map(move |k| {
-        let distance = 2.5 * margin * f64::from(k.div_ceil(2));
+        let distance = 2.5 * margin * k.div_ceil(2) as f64;
         if k % 2 == 0 { distance } else { -distance }
     })
 }

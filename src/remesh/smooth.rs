@@ -118,7 +118,7 @@ pub async fn smooth_in_slices(
     let smoothed = mesh.positions().to_vec();
     mesh.positions_mut().copy_from_slice(&before);
     smoother.guard = Some(embedding_of(mesh, ordinary_edge));
-    if !smoother.move_to(mesh, &smoothed, iterations, pauses).await {
+    if !smoother.move_to(mesh, &smoothed, iterations, pauses).await && smoother.check_pairs(mesh).is_ok() {
         smoother.run(mesh, iterations, pauses).await;
     }
     if let Err(error) = smoother.check_pairs(mesh) {

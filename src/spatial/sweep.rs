@@ -45,15 +45,16 @@ const TESTS_PER_UNIT: usize = 256;
 /// The number of tests after which a sweep counts its work: columns have few.
 const TESTS: usize = 16 * TESTS_PER_UNIT;
 
-/// The number of balls of a column that are compared between two counts; columns of most meshes have fewer.
+/// The largest number of balls of a column that are compared between two counts; columns of most meshes have fewer.
 const CHUNK: usize = 32;
 
 /// Calls `found` once with every pair of `balls` whose centres are no farther apart than [`Proximity::distance_for`]
-/// returns for their radii, and pauses meanwhile. The order is unspecified but deterministic.
+/// returns for their radii, and pauses meanwhile. The order is unspecified but deterministic. Ends soon after `found` has
+/// returned false.
 pub async fn near_pairs(
     balls: Vec<VertexBall>,
     near: Proximity,
-    mut found: impl FnMut(&VertexBall, &VertexBall),
+    mut found: impl FnMut(&VertexBall, &VertexBall) -> bool,
     pauses: &Pauses,
 ) {
     let mut bound = FIRST_CLASS_BOUND * median_radius(&balls);
@@ -69,7 +70,7 @@ pub async fn near_pairs(
         // Longest edges are infinite if their squares overflow.
         bound = if bound < f32::MAX / FACTOR { bound * FACTOR } else { f32::INFINITY };
         if !class.is_empty() {
-            let class = sweep_class(class, &smaller, near, &mut found, pauses).await;
+            let Some(class) = sweep_class(class, &smaller, near, &mut found, pauses).await else { return };
             if smaller.is_empty() {
                 smaller = class;
             } else if !left.is_empty() {
@@ -96,18 +97,18 @@ async fn sweep_class(
     class: Vec<VertexBall>,
     smaller: &[VertexBall],
     near: Proximity,
-    found: &mut impl FnMut(&VertexBall, &VertexBall),
+    found: &mut impl FnMut(&VertexBall, &VertexBall) -> bool,
     pauses: &Pauses,
-) -> Vec<VertexBall> {
+) -> Option<Vec<VertexBall>> {
     let largest = class.iter().fold(0.0, |most, ball| if ball.radius > most { ball.radius } else { most });
     let reach = near.distance_for(largest, largest);
     let width = Width(1.0 / (COLUMN_MARGIN * f64::from(reach)));
-    let tests = Tests { count: Cell::new(0), pauses };
+    let tests = Tests { count: Cell::new(0), is_over: Cell::new(false), pauses };
     let mut test = |a: &VertexBall, b: &VertexBall| {
         tests.count.set(tests.count.get() + 1);
         let reach = near.distance_for(a.radius, b.radius);
-        if a.position.distance_squared(b.position) <= reach * reach {
-            found(a, b);
+        if a.position.distance_squared(b.position) <= reach * reach && !found(a, b) {
+            tests.is_over.set(true);
         }
     };
     let large = Columns::new(width, class);
@@ -115,6 +116,9 @@ async fn sweep_class(
     let mut row = 0;
     for k in 0..large.count() {
         large.pairs_at(k, &mut row, reach, &mut test, &tests).await;
+        if tests.is_over.get() {
+            return None;
+        }
     }
     if !smaller.is_empty() {
         let filter = Filter::around(&large);
@@ -123,14 +127,19 @@ async fn sweep_class(
         let mut rows = [0; 3];
         for k in 0..large.count() {
             large.pairs_at_with(k, &around, &mut rows, reach, &mut test, &tests).await;
+            if tests.is_over.get() {
+                return None;
+            }
         }
     }
-    large.balls
+    Some(large.balls)
 }
 
 /// The tests of a sweep that are not yet counted as work.
 struct Tests<'a> {
     count: Cell<usize>,
+    /// Whether no more pairs are asked for.
+    is_over: Cell<bool>,
     pauses: &'a Pauses,
 }
 
@@ -275,13 +284,17 @@ impl Columns {
     ) {
         let [x, y] = self.column(k);
         let own = self.balls(k);
-        for start in (0..own.len()).step_by(CHUNK) {
-            let end = own.len().min(start + CHUNK);
+        let chunk = chunk_for(own);
+        for start in (0..own.len()).step_by(chunk) {
+            let end = own.len().min(start + chunk);
             for (i, a) in (start + 1..).zip(&own[start..end]) {
                 let top = a.position.z + reach;
                 own[i..].iter().take_while(|b| b.position.z <= top).for_each(|b| test(a, b));
             }
             tests.counted().await;
+            if tests.is_over.get() {
+                return;
+            }
         }
         if self.column(k + 1) == [x, y + 1] {
             visit_column_pairs(own, self.balls(k + 1), reach, test, tests).await;
@@ -329,6 +342,11 @@ impl Columns {
     }
 }
 
+/// Returns how many balls are compared with those of a column between two counts: fewer if it has many.
+fn chunk_for(column: &[VertexBall]) -> usize {
+    (CHUNK * TESTS / column.len().max(1)).clamp(1, CHUNK)
+}
+
 /// Calls `test` with the pairs of balls of two columns whose heights differ by at most `reach`; both columns are sorted
 /// by height.
 async fn visit_column_pairs(
@@ -339,9 +357,12 @@ async fn visit_column_pairs(
     tests: &Tests<'_>,
 ) {
     let mut low = 0;
-    for chunk in balls.chunks(CHUNK) {
+    for chunk in balls.chunks(chunk_for(others)) {
         visit_chunk_pairs(chunk, others, &mut low, reach, test);
         tests.counted().await;
+        if tests.is_over.get() {
+            return;
+        }
     }
 }
 
@@ -415,7 +436,15 @@ mod tests {
         let (balls, mut pairs) = ((0..2000).map(ball).collect(), 0);
         let near = Proximity { least: 0.0, margin: 0.0, share: 1.0 };
         let pauses = Pauses::default();
-        let mut sweep = Box::pin(near_pairs(balls, near, |_, _| pairs += 1, &pauses));
+        let mut sweep = Box::pin(near_pairs(
+            balls,
+            near,
+            |_, _| {
+                pairs += 1;
+                true
+            },
+            &pauses,
+        ));
         let count = (0..).take_while(|_| advance(&mut sweep).is_pending()).count();
         drop(sweep);
         assert_eq!(pairs, 2000 * 1999 / 2);

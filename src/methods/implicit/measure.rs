@@ -4,8 +4,12 @@
 use crate::math::Vec3;
 use crate::mesh::{TriangleMesh, curvature};
 use crate::methods::MethodError;
+use crate::pauses::Pauses;
 use crate::spatial::TriangleTree;
 use serde::Serialize;
+
+/// Units of work of a search for the closest point, which takes a millisecond in a surface of noise.
+const QUERY: usize = 20;
 
 /// How well a surface fits points: their distances from it, in the units of the points, and how curved the surface is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -20,6 +24,20 @@ pub struct Fitness {
     /// Mean over the vertices of |H|, the absolute mean curvature of the surface, in inverse units of the points'
     /// coordinates.
     pub mean_curvature: f64,
+}
+
+/// Returns the root mean square distance of `points` from `surface`, infinite without a surface or points, and pauses
+/// meanwhile.
+pub async fn rms_distance(points: Vec<Vec3>, surface: TriangleMesh, pauses: Pauses) -> f64 {
+    let Ok(tree) = TriangleTree::in_slices(&surface, &pauses).await else { return f64::INFINITY };
+    let (mut sum, mut count) = (0.0, 0);
+    for &p in &points {
+        if let Some(hit) = tree.closest(p) {
+            (sum, count) = (sum + hit.distance * hit.distance, count + 1);
+        }
+        pauses.after(QUERY).await;
+    }
+    if count > 0 { (sum / f64::from(count)).sqrt() } else { f64::INFINITY }
 }
 
 impl Fitness {

@@ -9,11 +9,13 @@ use super::edits::PointEdits;
 use super::exterior::Exterior;
 use super::extract::{Extraction, default_cell};
 use super::kernel::Kernel;
-use super::measure::Fitness;
+use super::measure::rms_distance;
 use super::params::{ImplicitParams, Sides};
 use super::sampling::Samples;
 use super::solve::{Constraints, Solver};
 use super::{SEED, Solved};
+use crate::pauses::{Computation, Pauses, advance};
+use std::task::Poll;
 
 /// Root mean square distance of the points from the surface with constraints outside only, relative to that with both sides,
 /// below which the former is taken.
@@ -40,6 +42,8 @@ pub struct SidesTrial {
 enum Attempt {
     Solve(Box<Solver>, Constraints),
     Extract(Box<Extraction>),
+    /// Measures its distance from the points.
+    Measure(Computation<f64>),
     /// Its distance from the points; infinite without a surface.
     Done(f64),
 }
@@ -97,9 +101,13 @@ impl Attempt {
                 Ok(Some(mesh)) => {
                     let step = samples.cloud.len().div_ceil(MEASURED);
                     let points = map.all_in_world(samples.cloud.points.iter().step_by(step));
-                    Fitness::of(&points, &mesh).ok().map(|fitness| Self::Done(fitness.rms))
+                    Some(Self::Measure(Box::pin(rms_distance(points, mesh, Pauses::default()))))
                 }
                 Err(_) => None,
+            },
+            Self::Measure(mut distance) => match advance(&mut distance) {
+                Poll::Ready(distance) => Some(Self::Done(distance)),
+                Poll::Pending => Some(Self::Measure(distance)),
             },
             done @ Self::Done(_) => Some(done),
         };
@@ -123,7 +131,7 @@ impl Attempt {
         match self {
             Self::Solve(..) => 0.0,
             Self::Extract(extraction) => 0.5 + 0.5 * extraction.progress(),
-            Self::Done(_) => 1.0,
+            Self::Measure(_) | Self::Done(_) => 1.0,
         }
     }
 }

@@ -33,8 +33,8 @@ pub(super) async fn proposed(surface: &Band, pauses: &Pauses) -> Vec<ControlElli
         // Closest points are hard to tell in the middle of a sphere: one of its balls is enough.
         if !balls.iter().any(|ball| ball.touches(at[0])) {
             let component = component[surface.walker.mesh().triangles[t][0] as usize];
-            balls.extend(inner_ball(surface, at, diagonal).map(|ball| Ball { component, ..ball }));
-            pauses.after(STEPS).await;
+            let ball = inner_ball(surface, at, diagonal, pauses).await;
+            balls.extend(ball.map(|ball| Ball { component, ..ball }));
         }
     }
     let largest = balls.iter().map(|ball| ball.radius).fold(0.0, f64::max);
@@ -126,14 +126,16 @@ fn places(surface: &Band) -> impl Iterator<Item = (usize, [Vec3; 2])> {
 }
 
 /// Returns the largest ball inside the surface that touches it at a point with a normal (shrinking ball; Ma, Bae & Choi,
-/// *3D medial axis point approximation using nearest neighbors and the normal field*, 2012).
-fn inner_ball(surface: &Band, [at, normal]: [Vec3; 2], diagonal: f64) -> Option<Ball> {
+/// *3D medial axis point approximation using nearest neighbors and the normal field*, 2012). Pauses meanwhile.
+async fn inner_ball(surface: &Band, [at, normal]: [Vec3; 2], diagonal: f64, pauses: &Pauses) -> Option<Ball> {
     let (p, inwards) = (at.as_dvec3(), -normal.as_dvec3());
     let lifted = (p + inwards * (1e-5 * diagonal)).as_vec3();
     let across = surface.walker.tree().ray_hit(lifted, -normal)?;
     let mut ball = Ball { center: p, radius: 0.5 * across.distance, component: 0 };
     for _ in 0..STEPS {
         ball.center = p + inwards * ball.radius;
+        // A search takes long where many triangles are about as near.
+        pauses.now().await;
         let nearest = surface.walker.closest(ball.center.as_vec3())?;
         if nearest.distance >= ball.radius * (1.0 - 1e-3) {
             return Some(ball);

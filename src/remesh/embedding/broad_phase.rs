@@ -84,13 +84,14 @@ impl Embedding {
         let most = if self.limits_pairs { most_pairs(mesh) } else { usize::MAX };
         self.swept = 0;
         let add = |a: &VertexBall, b: &VertexBall| {
-            if self.swept < most && (self.is_searched_around(a.vertex) || self.is_searched_around(b.vertex)) {
+            if self.is_searched_around(a.vertex) || self.is_searched_around(b.vertex) {
                 self.add_pair(mesh, a, b, proximity);
                 self.swept += 1;
             }
+            self.swept < most
         };
         near_pairs(balls, proximity, add, pauses).await;
-        self.is_crowded |= self.swept == most;
+        self.is_crowded |= self.swept >= most;
     }
 
     /// Sets whether sweeps end at the number of pairs of near vertices for which there is memory. If they do, the caller has
