@@ -7,6 +7,7 @@ use super::cloud::Cloud;
 use super::normals::{Normals, estimated_normals};
 use super::sampling::subsampled;
 use crate::math::{Bounds, Vec3, spread_directions};
+use crate::pauses::Pauses;
 use crate::spatial::PointGrid;
 
 /// Number of exterior points on a sphere around all input points; they are always added.
@@ -112,12 +113,18 @@ pub fn exterior_from_points(cloud: &Cloud, given: Vec<Vec3>) -> Exterior {
 /// They are made from an even sample of the surface points, by an offset towards each camera that sees the point, or
 /// without cameras along the normal, given or estimated. Exterior points too near to the surface are dropped, and
 /// Poisson-disc sampling leaves at most one for ten surface points, or 30 if that is more. Points on a sphere around
-/// the cloud are added.
-pub fn generate_exterior(cloud: &Cloud, cameras: &[Camera], spacing: f32, seed: u64) -> Exterior {
+/// the cloud are added. Pauses meanwhile.
+pub async fn generate_exterior(
+    cloud: &Cloud,
+    cameras: &[Camera],
+    spacing: f32,
+    seed: u64,
+    pauses: &Pauses,
+) -> Exterior {
     let target_count = (cloud.len() / SURFACE_POINTS).max(MIN_POINTS);
     // A few more than wanted, as some will be rejected.
     let positions = target_count + target_count / 4;
-    let directions = outward_directions(cloud, cameras, positions, spacing, seed);
+    let directions = outward_directions(cloud, cameras, positions, spacing, seed, pauses).await;
     let offset = [OFFSET * spacing, NOISE * directions.noise, MIN_OFFSET].into_iter().fold(0.0, f32::max);
     let surface = PointGrid::of(&cloud.points, offset);
     let candidates =
@@ -137,12 +144,13 @@ struct OutwardDirections {
 
 /// Returns outward directions at an even sample of no more than `positions` surface points: towards the cameras that
 /// see them, or without cameras along their normals.
-fn outward_directions(
+async fn outward_directions(
     cloud: &Cloud,
     cameras: &[Camera],
     positions: usize,
     spacing: f32,
     seed: u64,
+    pauses: &Pauses,
 ) -> OutwardDirections {
     let (oriented, normals) = match &cloud.normals {
         Some(given) => {
@@ -152,7 +160,7 @@ fn outward_directions(
         }
         None => {
             let at = subsampled(&cloud.points, if positions > ORIENTED { positions } else { ORIENTED }, seed);
-            let normals = estimated_normals(&cloud.points, &at, spacing);
+            let normals = estimated_normals(&cloud.points, &at, spacing, pauses).await;
             (at, normals)
         }
     };
@@ -275,6 +283,7 @@ mod tests {
     use super::*;
     use crate::math::{DVec3, Random};
     use crate::methods::implicit::cloud::mean_spacing;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -322,7 +331,8 @@ mod tests {
             ("both", &known, &cameras),
             ("none", &unknown, &[]),
         ] {
-            let Exterior { near, offset, on_sphere, .. } = generate_exterior(cloud, cameras, spacing, 1);
+            let Exterior { near, offset, on_sphere, .. } =
+                finished(generate_exterior(cloud, cameras, spacing, 1, &Pauses::default()));
             println!(
                 "{name}: {} points, nearest {}",
                 near.len(),
@@ -333,7 +343,7 @@ mod tests {
                 assert!(distance(p) > 0.02 && distance(p) < 0.3, "{name}: {p} is {} outside", distance(p));
             }
             assert!(on_sphere.len() == SPHERE_POINTS && on_sphere.iter().all(|p| p.length() > 1.05));
-            let again = generate_exterior(cloud, cameras, spacing, 1);
+            let again = finished(generate_exterior(cloud, cameras, spacing, 1, &Pauses::default()));
             assert_eq!((&near, &on_sphere, offset), (&again.near, &again.on_sphere, again.offset));
             // Each is kept with the points it was made from, and dropped if a surface point is added in its position.
             assert_eq!(again.valid_after_edits(&cloud.points, &[], &[])[0].len(), near.len());

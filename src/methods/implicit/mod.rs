@@ -67,6 +67,7 @@ use super::{LiveSurface, MethodError, StepReport, Times};
 use crate::math::order::median;
 use crate::math::{DAffine3, DVec3, PositionIndex, Vec3};
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
+use crate::pauses::{Computation, Pauses, advance, finished};
 use crate::remesh::Changes;
 use crate::warning::{Place, Warning, WarningCode};
 use automatic::OffSurfaceSearch;
@@ -81,6 +82,8 @@ use sampling::{Samples, Sampling};
 use serde::{Deserialize, Serialize};
 use sides_trial::SidesTrial;
 use solve::{Constraints, Solution, Solver};
+use std::future::ready;
+use std::task::Poll;
 
 /// Options of an [`ImplicitSurface`], given to [`ImplicitSurface::new`] together with its points.
 #[derive(Clone, Debug)]
@@ -232,6 +235,8 @@ enum Stage {
 /// The choice of points off the surface.
 enum Constraining {
     Search(Box<OffSurfaceSearch>),
+    /// Makes the points outside, which are tried beside those on both sides, if there are any.
+    Outside(Computation<Exterior>, Option<Exterior>),
     /// The choice of the sides where these are ambiguous.
     Trial(Box<SidesTrial>),
 }
@@ -240,6 +245,7 @@ impl Constraining {
     fn progress(&self) -> f64 {
         match self {
             Self::Search(search) => 0.5 * search.progress(),
+            Self::Outside(..) => 0.5,
             Self::Trial(trial) => 0.5 + 0.5 * trial.progress(),
         }
     }
@@ -450,13 +456,19 @@ impl ImplicitSurface {
     /// samples and the edits; returns its state if it is unfinished. Does nothing before the samples are selected.
     fn make_constraints(&mut self, state: Option<Constraining>) -> Result<Option<Constraining>, MethodError> {
         let Some(samples) = &self.samples else { return Ok(None) };
-        let (sides, exterior) = match state {
-            _ if self.params.sides == Sides::Outside => (Sides::Outside, self.exterior_points(samples)),
+        let state = match state {
+            Some(state @ Constraining::Outside(_, None)) => state,
+            _ if self.params.sides == Sides::Outside => {
+                Constraining::Outside(self.exterior_points(samples), None)
+            }
             None => {
                 let search = OffSurfaceSearch::new(samples, SEED);
                 return Ok(Some(Constraining::Search(Box::new(search))));
             }
-            Some(Constraining::Search(mut search)) => {
+            Some(state) => state,
+        };
+        let (sides, exterior) = match state {
+            Constraining::Search(mut search) => {
                 let Some(found) = search.advance() else { return Ok(Some(Constraining::Search(search))) };
                 let known = self.known_outside(samples);
                 let share = search.outside_share(&known.near);
@@ -464,12 +476,19 @@ impl ImplicitSurface {
                 self.ambiguous_sides = found.is_ambiguous() || contradict;
                 let both = known.with_both_sides(found, share);
                 if self.ambiguous_sides && self.params.sides == Sides::Auto {
-                    let trial = SidesTrial::new(samples, self.map, both, self.exterior_points(samples));
-                    return Ok(Some(Constraining::Trial(Box::new(trial))));
+                    return Ok(Some(Constraining::Outside(self.exterior_points(samples), Some(both))));
                 }
                 (Sides::Both, both)
             }
-            Some(Constraining::Trial(mut trial)) => {
+            Constraining::Outside(mut work, both) => match (advance(&mut work), both) {
+                (Poll::Pending, both) => return Ok(Some(Constraining::Outside(work, both))),
+                (Poll::Ready(outside), Some(both)) => {
+                    let trial = SidesTrial::new(samples, self.map, both, outside);
+                    return Ok(Some(Constraining::Trial(Box::new(trial))));
+                }
+                (Poll::Ready(outside), None) => (Sides::Outside, outside),
+            },
+            Constraining::Trial(mut trial) => {
                 let Some(chosen) = trial.advance(samples) else {
                     return Ok(Some(Constraining::Trial(trial)));
                 };
@@ -487,23 +506,21 @@ impl ImplicitSurface {
         if self.options.exterior.is_none() && self.options.cameras.is_empty() {
             exterior_from_points(&samples.cloud, Vec::new())
         } else {
-            self.exterior_points(samples)
+            finished(self.exterior_points(samples))
         }
     }
 
-    /// Returns the points outside that the caller gave, or that are made from cameras, normals or the points.
-    fn exterior_points(&self, samples: &Samples) -> Exterior {
-        match &self.options.exterior {
-            Some(given) => {
-                exterior_from_points(&samples.cloud, given.iter().map(|&p| self.map.in_box(p)).collect())
-            }
-            None => {
-                let cameras = self.options.cameras.iter();
-                let cameras: Vec<Camera> =
-                    cameras.map(|camera| camera.clone().transformed(&self.map.affine())).collect();
-                generate_exterior(&samples.cloud, &cameras, samples.spacing as f32, SEED)
-            }
+    /// Computes the points outside that the caller gave, or that are made from cameras, normals or the points.
+    fn exterior_points(&self, samples: &Samples) -> Computation<Exterior> {
+        if let Some(given) = &self.options.exterior {
+            let given = given.iter().map(|&p| self.map.in_box(p)).collect();
+            return Box::pin(ready(exterior_from_points(&samples.cloud, given)));
         }
+        let cameras = self.options.cameras.iter();
+        let cameras: Vec<Camera> =
+            cameras.map(|camera| camera.clone().transformed(&self.map.affine())).collect();
+        let (cloud, spacing) = (samples.cloud.clone(), samples.spacing as f32);
+        Box::pin(async move { generate_exterior(&cloud, &cameras, spacing, SEED, &Pauses::default()).await })
     }
 
     /// Returns measures of the sampled points, and the values chosen by them for parameters that are `auto`; `None` before

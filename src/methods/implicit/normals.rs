@@ -4,6 +4,7 @@
 
 use crate::math::order::{rank_f64, sort_by_rank, sort_distinct};
 use crate::math::{DMat3, DVec3, Vec3, symmetric};
+use crate::pauses::Pauses;
 use crate::spatial::PointGrid;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -20,6 +21,9 @@ const TRIALS: usize = 200;
 /// are on another sheet of the surface.
 const NEIGHBOURS: usize = 10;
 
+/// Number of points in neighbourhoods that are a unit of work.
+const POINTS_PER_UNIT: usize = 100;
+
 /// Unit normals of the surface at some points of a cloud, and the noise of the cloud, for making exterior points.
 pub struct Normals {
     /// Unit normals, one for each point at which they were requested, pointing outwards as far as can be determined.
@@ -34,13 +38,15 @@ pub struct Normals {
 ///
 /// Within each connected component of the graph that links neighbouring points, normals are oriented like an already
 /// oriented neighbour, the pair with the smallest angle first; then each component is oriented such that it encloses a
-/// positive volume.
-pub fn estimated_normals(points: &[Vec3], at: &[u32], spacing: f32) -> Normals {
+/// positive volume. Pauses meanwhile.
+pub async fn estimated_normals(points: &[Vec3], at: &[u32], spacing: f32, pauses: &Pauses) -> Normals {
     let grid = PointGrid::of(points, RADII[0] * spacing);
     let positions: Vec<Vec3> = at.iter().map(|&i| points[i as usize]).collect();
-    let (radius, noise) = flattest_radius(&grid, &positions, spacing);
-    let mut directions: Vec<Vec3> =
-        positions.iter().map(|&p| Plane::around(&grid, p, radius).normal).collect();
+    let (radius, noise) = flattest_radius(&grid, &positions, spacing, pauses).await;
+    let mut directions = Vec::with_capacity(positions.len());
+    for &p in &positions {
+        directions.push(Plane::around(&grid, p, radius, pauses).await.normal);
+    }
     let graph = neighbour_graph(&positions, &directions, radius);
     let mut oriented = vec![false; positions.len()];
     for part in connected_components(&graph) {
@@ -63,7 +69,7 @@ struct Plane {
 }
 
 impl Plane {
-    fn around(grid: &PointGrid, p: Vec3, radius: f32) -> Self {
+    async fn around(grid: &PointGrid, p: Vec3, radius: f32, pauses: &Pauses) -> Self {
         let (mut count, mut sum, mut squares) = (0.0, DVec3::ZERO, DMat3::ZERO);
         grid.within(p, radius, |i, _| {
             let d = (grid.points()[i as usize] - p).as_dvec3();
@@ -72,6 +78,7 @@ impl Plane {
             squares += symmetric::outer(d);
             true
         });
+        pauses.after(1 + count as usize / POINTS_PER_UNIT).await;
         let mean = sum / count;
         let spread = squares * (1.0 / count) - symmetric::outer(mean);
         let (values, vectors) = symmetric::eigen(spread);
@@ -87,12 +94,15 @@ impl Plane {
 /// Returns the radius of the neighbourhoods to which planes are fitted, the smallest of [`RADII`] whose median
 /// neighbourhood is planar, or else the one whose median neighbourhood is flattest; and the thickness of that
 /// neighbourhood. Both are in units of the points' coordinates.
-fn flattest_radius(grid: &PointGrid, positions: &[Vec3], spacing: f32) -> (f32, f64) {
+async fn flattest_radius(grid: &PointGrid, positions: &[Vec3], spacing: f32, pauses: &Pauses) -> (f32, f64) {
     let step = positions.len().div_ceil(TRIALS);
     let mut best = (f64::INFINITY, RADII[0] * spacing, 0.0);
     for radius in RADII.map(|r| r * spacing) {
-        let planes = positions.iter().step_by(step).map(|&p| Plane::around(grid, p, radius));
-        let mut found: Vec<(f64, f64)> = planes.map(|plane| (plane.flatness(), plane.thickness)).collect();
+        let mut found: Vec<(f64, f64)> = Vec::new();
+        for &p in positions.iter().step_by(step) {
+            let plane = Plane::around(grid, p, radius, pauses).await;
+            found.push((plane.flatness(), plane.thickness));
+        }
         sort_by_rank(&mut found, |&(flatness, _)| rank_f64(flatness));
         let (flatness, thickness) = found[found.len() / 2];
         if flatness < best.0 {
@@ -185,6 +195,7 @@ mod tests {
     use super::*;
     use crate::math::Random;
     use crate::methods::implicit::cloud::mean_spacing;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -232,7 +243,8 @@ mod tests {
                     };
                     let points: Vec<Vec3> = exact.iter().map(&mut moved).collect();
                     let at: Vec<u32> = (0..count).step_by(8).collect();
-                    let found = estimated_normals(&points, &at, mean_spacing(&points) as f32);
+                    let spacing = mean_spacing(&points) as f32;
+                    let found = finished(estimated_normals(&points, &at, spacing, &Pauses::default()));
                     let right = |(i, n): &(&u32, &Vec3)| outwards[**i as usize].dot(n.as_dvec3()) > 0.5;
                     let share =
                         at.iter().zip(&found.directions).filter(right).count() as f64 / at.len() as f64;
