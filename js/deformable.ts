@@ -348,8 +348,7 @@ export class DeformableModel implements Stepper {
 
   /**
    * Runs to the end, yielding to the event loop between slices of work, also within a step. Whatever is asked of the model
-   * or its mesh meanwhile ends a step that is under way first. Parameters and attractors may be changed meanwhile. With a
-   * {@link LargeVolume}, steps are not interrupted.
+   * or its mesh meanwhile ends a step that is under way first. Parameters and attractors may be changed meanwhile.
    *
    * @returns The last report.
    * @throws `signal.reason` when aborted, and the model is as after the last step that ended, and stays usable; any error

@@ -49,6 +49,9 @@ export const MOST_LABEL_VERTICES_OF_SMALL = 1_000_000;
 /** Most bytes that slices between those of an image of small files may take, with the work on them. */
 export const MOST_ENRICHED_OF_SMALL = 384 * 2 ** 20;
 
+/** Most bytes of intensities that an image of small files may be written as, if it has others than its voxels. */
+export const MOST_WRITTEN_OF_SMALL = 2 ** 28;
+
 /** Most vertices of a tracked surface in an image of small files, unless its maker allows more, for the same reason. */
 export const MOST_TRACKED_OF_SMALL = 200_000;
 

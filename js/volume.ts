@@ -16,7 +16,7 @@ import {
 import type { LengthUnit, Space, Vec3, VolumeFileOptions, VolumeInit, VoxelArray } from './data.js';
 import { Handle } from './runtime.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
-import { isOfSmall, limitOf, MOST_ENRICHED_OF_SMALL, noted, notedLike } from './small-files.js';
+import { isOfSmall, limitOf, MOST_ENRICHED_OF_SMALL, MOST_WRITTEN_OF_SMALL, noted, notedLike } from './small-files.js';
 import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
 import * as glue from './vesicle.js';
 import { RawVolume } from './vesicle.js';
@@ -153,13 +153,15 @@ export class Volume {
    *
    * @param options - `gzip`: compress; the whole file for NIfTI (`.nii.gz`), the voxels inside the file for the others.
    *   Default false.
-   * @throws {@link VesicleError} `invalid-argument`: another format; `too-large`.
+   * @throws {@link VesicleError} `invalid-argument`: another format; `too-large`, also for more than 256 MiB of intensities
+   *   in place of voxels that come from a file of at most 128 KiB: write those as NIfTI.
    */
   toBytes(format: VolumeFormat, options: { gzip?: boolean } = {}): Uint8Array {
     choice('format', format, ['nifti', 'nrrd', 'mha']);
     const { gzip = false } = checkProperties('options', options, ['gzip']);
     boolean('gzip', gzip);
-    return this.#handle.use((raw) => raw.toBytes(format, gzip));
+    const most = limitOf(undefined, isOfSmall(this), MOST_WRITTEN_OF_SMALL);
+    return this.#handle.use((raw) => raw.toBytes(format, gzip, most));
   }
 
   /** Number of voxels along x, y and z. */

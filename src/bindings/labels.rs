@@ -8,7 +8,7 @@ use super::deformable::RawDeformable;
 use super::error::Failure;
 use super::volume::{RawVolume, voxels};
 use vesicle::io::{Compression, VolumeFormat, write_volume};
-use vesicle::volume::{Interpolation, Region, ResampleGrid};
+use vesicle::volume::{Interpolation, Region, ResampleGrid, VolumeError};
 
 #[wasm_bindgen]
 impl RawVolume {
@@ -68,11 +68,16 @@ impl RawVolume {
         Ok(self.0.write(region(min, dims)?, &voxels(data)?, frame).map_err(Failure::from)?)
     }
 
-    /// Returns the volume as a file; `format` is nifti, nrrd or mha. Compressed if `gzip`.
+    /// Returns the volume as a file; `format` is nifti, nrrd or mha. Compressed if `gzip`. Refused if intensities of more than
+    /// `most` bytes would be stored in place of the voxels.
     #[wasm_bindgen(js_name = toBytes)]
-    pub fn to_bytes(&self, format: &str, gzip: bool) -> Result<Vec<u8>, JsValue> {
+    pub fn to_bytes(&self, format: &str, gzip: bool, most: Option<u32>) -> Result<Vec<u8>, JsValue> {
         let format = VolumeFormat::from_name(format)
             .ok_or_else(|| Failure::invalid("format", "must be one of nifti, nrrd, mha"))?;
+        let bytes = if format == VolumeFormat::Nifti { 0 } else { self.0.unscaled_bytes() };
+        if most.is_some_and(|most| bytes > u64::from(most)) {
+            return Err(Failure::from(VolumeError::TooLarge { bytes }).into());
+        }
         let compression = if gzip { Compression::Deflate } else { Compression::None };
         Ok(write_volume(&self.0, format, compression).map_err(Failure::from)?)
     }

@@ -77,8 +77,7 @@ impl FourTriangles {
     pub(super) fn new(triangles: &[Facet]) -> Option<Self> {
         let mut lanes = [[[0.0; 4]; 3]; 6];
         for lane in 0..4 {
-            let Facet { corners: [a, b, c], beyond } =
-                triangles.get(lane).or(triangles.first())?.from_largest_angle();
+            let Facet { corners: [a, b, c], beyond } = triangles.get(lane).or(triangles.first())?.turned();
             let edges = [b - a, c - a];
             let sizes = edges[0].length_squared() * edges[1].length_squared();
             let cosine = edges[0].dot(edges[1]);
@@ -114,7 +113,7 @@ impl Facet {
     }
 
     /// Returns the triangle with its corners in their cyclic order, that with the largest angle first.
-    fn from_largest_angle(&self) -> Self {
+    fn turned(&self) -> Self {
         let [a, b, c] = self.corners;
         let [at_a, at_b, at_c] = [b.distance_squared(c), c.distance_squared(a), a.distance_squared(b)];
         let mut turned = *self;
@@ -201,7 +200,7 @@ impl Facets {
             let is_lower = dot(triangles.from_beyond[k], direction).simd_lt(f32x4::splat(-LEAST_RISE));
             let is_beyond = highest.simd_lt(f32x4::ZERO) & is_lower;
             // From beyond a side of an obtuse angle, the other side may be closer.
-            excluded = excluded | if k == 0 { is_beyond } else { is_beyond & is_acute };
+            excluded |= if k == 0 { is_beyond } else { is_beyond & is_acute };
         }
         excluded.to_bitmask()
     }

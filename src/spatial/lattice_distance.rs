@@ -624,8 +624,8 @@ mod tests {
         check_far_points(0.4);
     }
 
-    /// What is left without the triangles that are no closer than their neighbours has the same distance, at all corners of
-    /// random blocks.
+    /// Without the triangles that are no closer than their neighbours, distances are the same, at all corners of random
+    /// blocks.
     #[test]
     fn no_closest_triangle_is_excluded_for_one_beyond_its_edges() {
         let mut random = Random::new(12);

@@ -432,23 +432,38 @@ mod tests {
     /// Where all balls are in one column, as those of a mesh that intersects itself everywhere.
     #[test]
     fn a_column_of_many_balls_has_pauses() {
-        let ball = |k| VertexBall { vertex: VertexId(k), position: Vec3::Z * 1e-4 * k as f32, radius: 1.0 };
-        let (balls, mut pairs) = ((0..2000).map(ball).collect(), 0);
+        let ball = |k| VertexBall { vertex: VertexId(k), position: Vec3::Z * 1e-5 * k as f32, radius: 1.0 };
+        let (balls, pairs, mut most) = ((0..6000).map(ball).collect(), Cell::new(0), 0);
         let near = Proximity { least: 0.0, margin: 0.0, share: 1.0 };
         let pauses = Pauses::default();
-        let mut sweep = Box::pin(near_pairs(
-            balls,
-            near,
-            |_, _| {
+        let count = |_: &VertexBall, _: &VertexBall| {
+            pairs.set(pairs.get() + 1);
+            true
+        };
+        let mut sweep = Box::pin(near_pairs(balls, near, count, &pauses));
+        let mut before = 0;
+        while advance(&mut sweep).is_pending() {
+            most = most.max(pairs.get() - before);
+            before = pairs.get();
+        }
+        assert_eq!(pairs.get(), 6000 * 5999 / 2);
+        assert!(most < 400_000, "{most}");
+    }
+
+    #[test]
+    fn a_sweep_ends_when_no_more_pairs_are_asked_for() {
+        let ball = |k| VertexBall { vertex: VertexId(k), position: Vec3::Z * 1e-5 * k as f32, radius: 1.0 };
+        for radii in [[1.0, 1.0], [1.0, 20.0]] {
+            let balls = (0..6000).map(|k| VertexBall { radius: radii[k as usize % 2], ..ball(k) }).collect();
+            let mut pairs = 0;
+            let near = Proximity { least: 0.0, margin: 0.0, share: 1.0 };
+            let found = |_: &VertexBall, _: &VertexBall| {
                 pairs += 1;
-                true
-            },
-            &pauses,
-        ));
-        let count = (0..).take_while(|_| advance(&mut sweep).is_pending()).count();
-        drop(sweep);
-        assert_eq!(pairs, 2000 * 1999 / 2);
-        assert!(count > 10, "{count}");
+                pairs < 5_000_000
+            };
+            finished(near_pairs(balls, near, found, &Pauses::default()));
+            assert!((5_000_000..6_000_000).contains(&pairs), "{pairs}");
+        }
     }
 
     /// Returns random balls in a box or on a plane, some outliers, some coincident, of ordinary, tiny and huge size.
@@ -486,6 +501,7 @@ mod tests {
             let mut found = Vec::new();
             let pair = |a: &VertexBall, b: &VertexBall| {
                 found.push([a.vertex.min(b.vertex).0, a.vertex.max(b.vertex).0]);
+                true
             };
             finished(near_pairs(balls.clone(), near, pair, &Pauses::default()));
             found.sort_unstable();

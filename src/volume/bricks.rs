@@ -122,6 +122,18 @@ impl BrickGrid {
         Ok(Self { dims, normalisation, pages, table, ..Self::default() })
     }
 
+    /// Returns a grid like this one without any brick.
+    pub fn emptied(&self) -> Self {
+        let table = vec![None; self.table.len()];
+        Self {
+            dims: self.dims,
+            normalisation: self.normalisation,
+            pages: self.pages,
+            table,
+            ..Self::default()
+        }
+    }
+
     /// Returns the number of voxels along x, y and z.
     pub fn dims(&self) -> [usize; 3] {
         self.dims

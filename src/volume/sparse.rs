@@ -168,7 +168,8 @@ impl SparseVolume {
     }
 
     /// Locks the bricks of all levels. A model exchanges them with its own while it computes, and reads them without
-    /// locking; the volume has none then, so others have to wait.
+    /// locking. Others wait, or, between slices of a step, use those that were the model's: whatever they are, a missing brick is
+    /// asked for.
     pub(crate) fn bricks(&self) -> MutexGuard<'_, Vec<BrickGrid>> {
         // No code that holds the lock leaves bricks in part.
         self.bricks.lock().unwrap_or_else(PoisonError::into_inner)

@@ -6,6 +6,17 @@ use super::voxels::{Voxels, each};
 use std::borrow::Cow;
 
 impl Volume {
+    /// Returns the number of bytes of the voxels that formats without slope and intercept store in place of those of the
+    /// volume; 0 if they store the same.
+    pub fn unscaled_bytes(&self) -> u64 {
+        let bytes = match self.voxels.as_ref() {
+            _ if self.slope == 1.0 && self.intercept == 0.0 => 0,
+            Voxels::U32(_) | Voxels::I32(_) | Voxels::F64(_) => size_of::<f64>(),
+            _ => size_of::<f32>(),
+        };
+        (bytes as u64).saturating_mul(self.voxels.len() as u64)
+    }
+
     /// Returns voxels whose stored values are the intensities of this volume, in all frames: its own if the slope is 1
     /// and the intercept 0, else floats, of 64 bits in place of 32-bit integers and 64-bit floats, of 32 bits in place
     /// of the others. NaN and infinite voxels are kept.

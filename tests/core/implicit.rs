@@ -992,3 +992,16 @@ fn previews_grow_during_extraction() {
     }
     assert!(curvature(surface.surface()).mean.iter().all(|h| h.is_finite()));
 }
+
+/// Neighbourhoods of noise are large until they are flat: normals of its points are estimated in many steps.
+#[test]
+fn exterior_points_of_noise_are_made_in_many_steps() {
+    let mut random = Random(5);
+    let points = (0..MANY).map(|_| Vec3::from([(); 3].map(|()| random.unit()))).collect();
+    let mut surface = begun(points, ImplicitParams::paper());
+    let mut steps = 0;
+    while ["subsample", "constraints"].contains(&surface.step().unwrap().phase.as_str()) {
+        steps += 1;
+    }
+    assert!(steps > 20, "{steps}");
+}

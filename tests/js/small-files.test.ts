@@ -204,3 +204,20 @@ test('a tracked surface with more vertices than allowed ends the run, and nothin
   });
   expect(tracker.statistics.length).toBeLessThan(2);
 });
+
+test('a small file with a slope is not written as many times its voxels', () => {
+  const plain = new Volume({ data: new Uint8Array(8), dims: [2, 2, 2], slope: 2.5 }).toNifti();
+  const side = 408;
+  const header = plain.slice(0, 352);
+  for (const axis of [1, 2, 3]) new DataView(header.buffer).setInt16(40 + 2 * axis, side, true);
+  const file = gzipSync(Buffer.concat([header, new Uint8Array(side ** 3)]), { level: 9 });
+  expect(file.length).toBeLessThan(2 ** 17);
+  const volume = Volume.parse(new Uint8Array(file));
+  for (const format of ['mha', 'nrrd'] as const)
+    expect(failure(() => volume.toBytes(format))).toMatchObject({ code: 'too-large', message: /271669248 bytes/ });
+  expect(volume.toBytes('nifti').length).toBe(352 + side ** 3);
+  volume.free();
+  const small = Volume.parse(plain);
+  expect(small.toBytes('mha').length).toBeGreaterThan(32);
+  small.free();
+});

@@ -46,18 +46,22 @@ pub(super) struct Progress {
 
 impl DeformableModel {
     /// Makes one step as [`Self::step`] does, bit for bit, in [slices](crate::pauses). Where the future is dropped in the
-    /// middle, the model must not be used before [`Self::discard_step`]. On a sparse volume, there are no pauses.
+    /// middle, the model must not be used before [`Self::discard_step`].
     ///
     /// # Errors
     /// As [`Self::step`].
     pub async fn step_in_slices(&mut self) -> Result<StepReport, MethodError> {
-        if self.pyramid.is_sparse() || self.is_done() {
+        if self.is_done() {
             return self.step();
         }
-        let (mut checkpoint, pauses) = (self.next_checkpoint(), Pauses::default());
+        let pauses = Pauses::default();
+        if let Some(levels) = self.pyramid.sparse.clone() {
+            return self.step_if_loaded_in_slices(&levels, &pauses).await;
+        }
+        let mut checkpoint = self.next_checkpoint();
         checkpoint.steps += 1;
         self.checkpoint = Some(checkpoint);
-        let report = self.iterate(None, &pauses).await;
+        let report = self.iterate(&pauses).await;
         match (&report, &mut self.checkpoint) {
             (Ok(report), Some(checkpoint)) if !report.done => checkpoint.work += pauses.work(),
             _ => self.checkpoint = None,
@@ -68,18 +72,24 @@ impl DeformableModel {
     /// Sets the model back to the end of the last step, after the future of [`Self::step_in_slices`] was dropped in the
     /// middle.
     pub fn discard_step(&mut self) {
+        self.discard_sparse_step();
         let Some(checkpoint) = self.checkpoint.take() else { return };
         let Checkpoint { mesh, progress, steps, .. } = *checkpoint;
         let replaced = std::mem::replace(&mut self.mesh, mesh);
         self.mesh.advance_versions_past(&replaced);
-        self.resolver = Resolver::with_max_vertices(self.resolver.max_vertices());
-        self.watch_output();
-        self.motion = Motion::default();
+        self.drop_caches();
         self.set_back_progress(progress);
         // The last one is the one that was given up; the others cannot fail, since they did not.
         for _ in 1..steps {
-            finished(self.iterate(None, &Pauses::default())).ok();
+            finished(self.iterate(&Pauses::default())).ok();
         }
+    }
+
+    /// Drops the caches of the mesh, whose state is set back.
+    pub(super) fn drop_caches(&mut self) {
+        self.resolver = Resolver::with_max_vertices(self.resolver.max_vertices());
+        self.watch_output();
+        self.motion = Motion::default();
     }
 
     /// Returns the present state, or the last copy if little has been done since.

@@ -119,15 +119,15 @@ impl LevelImage {
         Self { grid, bricks: None, gradient: None, scale, offset, parts, part_scale, part_offset }
     }
 
-    /// Makes a sparse level, of `dims` voxels divided into `parts`; voxel index = position · scale + offset.
-    fn of_bricks(dims: [usize; 3], parts: [usize; 3], [scale, offset]: [Vec3; 2]) -> Self {
+    /// Makes a sparse level of the voxels of `bricks`, divided into `parts`; voxel index = position · scale + offset.
+    fn of_bricks(bricks: BrickGrid, parts: [usize; 3], [scale, offset]: [Vec3; 2]) -> Self {
         let of_part = |axis: usize| match parts[axis] as f32 {
             1.0 => [scale[axis], offset[axis]],
             parts => [scale[axis] * parts, (offset[axis] + 0.5) * parts - 0.5],
         };
         Self {
-            grid: Grid { dims, values: Vec::new() }.into(),
-            bricks: Some(BrickGrid::default()),
+            grid: Grid { dims: bricks.dims(), values: Vec::new() }.into(),
+            bricks: Some(bricks),
             gradient: None,
             scale,
             offset,
@@ -566,7 +566,9 @@ impl Pyramid {
         let parts = parts_of(spacing);
         let to_world = model_to_world(&first.affine, parts);
         let mut levels = Vec::with_capacity(all.len() - finest);
-        for (k, level) in all[finest..].iter().enumerate() {
+        // Those of the model itself, of which others of the volume use some while it has those of the volume.
+        let own: Vec<_> = volume.bricks()[finest..].iter().map(BrickGrid::emptied).collect();
+        for ((k, level), own) in all[finest..].iter().enumerate().zip(own) {
             let map = level.affine.inverse() * to_world;
             let [x, y, z] = [map.matrix3.x_axis.x, map.matrix3.y_axis.y, map.matrix3.z_axis.z];
             let of_level = match k {
@@ -575,7 +577,7 @@ impl Pyramid {
                 _ => parts_on_coarse_level(parts, spacing_of(&level.affine), level.dims),
             };
             let [scale, offset] = [Vec3::new(x as f32, y as f32, z as f32), map.translation.as_vec3()];
-            levels.push(LevelImage::of_bricks(level.dims, of_level, [scale, offset]));
+            levels.push(LevelImage::of_bricks(own, of_level, [scale, offset]));
         }
         if let Some(level) = levels.last_mut() {
             *level = LevelImage { grid: coarsest, bricks: None, ..level.clone() };

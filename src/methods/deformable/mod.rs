@@ -262,6 +262,8 @@ pub struct DeformableModel {
     refreshed: Changes,
     /// The state some steps ago, from which a step that is given up is undone.
     checkpoint: Option<Box<Checkpoint>>,
+    /// The state before the step of a sparse volume that is under way.
+    before: Option<Box<Before>>,
     clock: fn() -> f64,
 }
 
@@ -390,6 +392,7 @@ impl DeformableModel {
             components: 0,
             refreshed: Changes::default(),
             checkpoint: None,
+            before: None,
             clock: || 0.0,
         };
         model.begin_on(begins_on_contour, pauses).await?;
@@ -425,26 +428,21 @@ impl DeformableModel {
     /// suffice.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
         self.checkpoint = None;
-        if self.pyramid.is_sparse() {
-            self.step_if_loaded()
-        } else {
-            finished(self.iterate(None, &Pauses::default()))
+        match self.pyramid.sparse.clone() {
+            Some(levels) => self.step_if_loaded(&levels),
+            None => finished(self.iterate(&Pauses::default())),
         }
     }
 
-    /// Makes one iteration, with pauses meanwhile; on a sparse volume `before` is completed, by which it can be undone.
-    async fn iterate(
-        &mut self,
-        before: Option<&mut Before>,
-        pauses: &Pauses,
-    ) -> Result<StepReport, MethodError> {
+    /// Makes one iteration, with pauses meanwhile; on a sparse volume [`Self::before`] is completed, by which it can be
+    /// undone.
+    async fn iterate(&mut self, pauses: &Pauses) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = std::mem::take(&mut self.refreshed);
         if !self.is_done() {
-            let mut before = before.filter(|_| self.pyramid.is_sparse());
-            self.move_vertices(before.as_deref_mut(), &mut times, pauses).await;
-            if let Some(before) = before {
-                self.prepare_edits(before)?;
+            self.move_vertices(&mut times, pauses).await;
+            if self.pyramid.is_sparse() {
+                self.prepare_edits()?;
             }
             if self.params.topology == Topology::Adaptive {
                 let active = self.vertices_to_check();
@@ -460,14 +458,14 @@ impl DeformableModel {
         Ok(self.report(changes, times))
     }
 
-    async fn move_vertices(&mut self, before: Option<&mut Before>, times: &mut Times, pauses: &Pauses) {
+    async fn move_vertices(&mut self, times: &mut Times, pauses: &Pauses) {
         let begin = (self.clock)();
         if self.pyramid.is_sparse() && std::mem::take(&mut self.needs_factor) {
             self.image_force_factor = self.measured_factor();
         }
         let examine_all = std::mem::take(&mut self.convergence.examine_next);
         self.motion.prepare(&self.mesh, self.keys, examine_all, self.followed_bounds());
-        if let Some(before) = before {
+        if let Some(before) = &mut self.before {
             before.keep(&self.mesh, self.keys, &self.motion.awake.with_neighbours);
         }
         let normals = (self.clock)();

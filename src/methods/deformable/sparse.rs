@@ -88,7 +88,7 @@ pub(super) struct Follow {
 
 /// The state before a step, to which it is undone if a brick was missing. Meshes take most of the memory, so each part of
 /// this one is copied before the phase of the step that changes it, in compact form.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Before {
     /// The vertices that the motion may change; all of them once there are edits.
     vertices: VertexStates,
@@ -98,14 +98,14 @@ pub(super) struct Before {
 }
 
 /// The part of the state of some vertices that motion changes, in the order of their slots.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct VertexStates {
     slots: FixedBitSet,
     vectors: [Vec<Vec3>; 2],
     scalars: [Vec<f32>; 3],
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct BeforeEdits {
     connectivity: Connectivity,
     checked_positions: Vec<Vec3>,
@@ -212,16 +212,35 @@ impl DeformableModel {
     }
 
     /// Makes one iteration if all bricks that it reads are loaded.
-    pub(super) fn step_if_loaded(&mut self) -> Result<StepReport, MethodError> {
-        let Some(SparseLevels { volume, finest, .. }) = self.pyramid.sparse.clone() else {
-            return finished(self.iterate(None, &Pauses::default()));
-        };
+    pub(super) fn step_if_loaded(&mut self, levels: &SparseLevels) -> Result<StepReport, MethodError> {
         // Locked all the time, so that other models of the volume wait.
-        let mut bricks = volume.bricks();
-        self.exchange_bricks(&mut bricks[finest..]);
-        let result = self.try_to_iterate();
-        self.exchange_bricks(&mut bricks[finest..]);
+        let mut bricks = levels.volume.bricks();
+        self.exchange_bricks(&mut bricks[levels.finest..]);
+        let result = finished(self.try_to_iterate(&Pauses::default()));
+        self.exchange_bricks(&mut bricks[levels.finest..]);
         result
+    }
+
+    /// Does what [`Self::step_if_loaded`] does, in slices. Meanwhile other models of the volume use bricks of their own.
+    pub(super) async fn step_if_loaded_in_slices(
+        &mut self,
+        levels: &SparseLevels,
+        pauses: &Pauses,
+    ) -> Result<StepReport, MethodError> {
+        self.exchange_bricks(&mut levels.volume.bricks()[levels.finest..]);
+        let result = self.try_to_iterate(pauses).await;
+        self.exchange_bricks(&mut levels.volume.bricks()[levels.finest..]);
+        result
+    }
+
+    /// Undoes a step that was given up between two slices, if there was one.
+    pub(super) fn discard_sparse_step(&mut self) {
+        let (Some(before), Some(levels)) = (self.before.take(), self.pyramid.sparse.clone()) else { return };
+        // Nobody waits for the bricks that it has missed.
+        self.check_missed().ok();
+        self.exchange_bricks(&mut levels.volume.bricks()[levels.finest..]);
+        self.drop_caches();
+        self.undo(*before);
     }
 
     /// Takes the bricks of all levels from the volume, or gives them back.
@@ -233,19 +252,20 @@ impl DeformableModel {
         }
     }
 
-    fn try_to_iterate(&mut self) -> Result<StepReport, MethodError> {
+    async fn try_to_iterate(&mut self, pauses: &Pauses) -> Result<StepReport, MethodError> {
         if let Err(needs) = self.check_loaded() {
             self.has_asked = true;
             return Err(needs);
         }
-        let (mut before, level) = (self.before(), self.level);
-        let result = finished(self.iterate(Some(&mut before), &Pauses::default()));
+        let level = self.level;
+        self.before = Some(Box::new(self.state_before()));
+        let result = self.iterate(pauses).await;
         let result = self.check_missed().and(result);
-        if let Err(MethodError::NeedsData { .. }) = result {
-            self.undo(before);
+        let before = self.before.take();
+        if let (Err(MethodError::NeedsData { .. }), Some(before)) = (&result, before) {
+            self.undo(*before);
             return result;
         }
-        drop(before);
         // Only a model that goes on drops bricks, so that of two models of one volume one always does.
         if self.level < level {
             self.drop_level(level);
@@ -308,10 +328,10 @@ impl DeformableModel {
     ///
     /// # Errors
     /// [`MethodError::NeedsData`] if bricks were missing so far.
-    pub(super) fn prepare_edits(&mut self, before: &mut Before) -> Result<(), MethodError> {
+    pub(super) fn prepare_edits(&mut self) -> Result<(), MethodError> {
         self.check_missed()?;
         self.motion.free_buffers();
-        let Self { mesh, keys, .. } = self;
+        let Self { mesh, keys, before: Some(before), .. } = self else { return Ok(()) };
         before.vertices = std::mem::take(&mut before.vertices).completed(mesh, *keys);
         before.edited = Some(BeforeEdits {
             connectivity: mesh.connectivity(),
@@ -341,7 +361,7 @@ impl DeformableModel {
         }
     }
 
-    fn before(&self) -> Before {
+    fn state_before(&self) -> Before {
         Before { vertices: VertexStates::default(), edited: None, progress: self.progress_so_far() }
     }
 
@@ -566,7 +586,9 @@ fn follow(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pauses::advance;
     use crate::volume::{SparseInit, SparseLevel, Voxels};
+    use std::task::Poll;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -643,5 +665,63 @@ mod tests {
                 Err(error) => panic!("{error}"),
             }
         }
+    }
+
+    /// Steps in slices that are given up now and then, and meanwhile another model of the same volume makes steps; both get
+    /// bricks when they need them.
+    #[test]
+    fn steps_in_slices_can_be_given_up_beside_another_model() {
+        let (whole, voxels) = volume();
+        whole.missing(0).unwrap().iter().for_each(|at| whole.insert(*at, &voxels(at)).unwrap());
+        let options = SparseOptions::default();
+        let mut expected = DeformableModel::on_sparse(&whole, options.clone()).unwrap();
+        let (volume, voxels) = volume();
+        let [mut model, mut other] =
+            [(); 2].map(|()| DeformableModel::on_sparse(&volume, options.clone()).unwrap());
+        let supply = |result: Result<StepReport, MethodError>| match result {
+            Err(MethodError::NeedsData { needs }) => {
+                needs.iter().for_each(|at| volume.insert(*at, &voxels(at)).unwrap());
+                None
+            }
+            result => Some(result.unwrap()),
+        };
+        let (mut given_up, mut asked, mut steps) = (0, 0, 0);
+        loop {
+            let before = model.save();
+            for most in [1, 2 + steps % 60] {
+                let mut step = Box::pin(model.step_in_slices());
+                let is_over = (0..most).any(|_| advance(&mut step).is_ready());
+                drop(step);
+                if is_over {
+                    model.restore(&before).unwrap();
+                    break;
+                }
+                model.discard_step();
+                given_up += 1;
+                assert_eq!(model.mesh.check(), Ok(()));
+                assert!(model.save() == before, "step {steps}");
+            }
+            let mut step = Box::pin(model.step_in_slices());
+            let result = loop {
+                if let Poll::Ready(result) = advance(&mut step) {
+                    break result;
+                }
+                supply(other.step());
+            };
+            drop(step);
+            let Some(report) = supply(result) else {
+                asked += 1;
+                continue;
+            };
+            expected.step().unwrap();
+            assert!(model.save() == expected.save(), "step {steps}");
+            steps += 1;
+            if report.done {
+                break;
+            }
+        }
+        assert!(given_up > 20 && asked > 0, "{given_up} given up, {asked} waited for bricks");
+        while supply(other.step()).is_none_or(|report| !report.done) {}
+        assert!(other.save() == expected.save());
     }
 }
