@@ -1,6 +1,7 @@
 // The voxels of images: from bytes, compressed or not, to typed arrays of stored values.
 import type { DataSet, Fragment } from 'dicom-parser';
 import type { VoxelArray } from '../data.js';
+import { isSmall } from '../small-files.js';
 import { type Decode, type Decoded, type Decoders, decoderOf } from './codecs.js';
 import { badDicom, reasonOf } from './error.js';
 import { BIG_ENDIAN, type Parser, PLAIN, pixelsOf, readWhole } from './parser.js';
@@ -153,8 +154,8 @@ function joined(file: Source, { byteArray }: DataSet, fragments: readonly Fragme
 /** Voxels of an image whose compressed bytes may be any, and more of them for each of these bytes. */
 const FREE_VOXELS = 2 ** 24;
 const VOXELS_PER_BYTE = 1000;
-/** The same for JPEG 2000, whose decoder may go through a voxel dozens of times. */
-const FREE_OF_JPEG_2000 = 2 ** 22;
+/** The same for JPEG 2000, whose decoder may go through a voxel dozens of times; per byte of images that are not small. */
+const FREE_OF_JPEG_2000 = 2 ** 21;
 const OF_JPEG_2000_PER_BYTE = 64;
 /** Most bytes that a byte of RLE can stand for. */
 const RLE_RATIO = 64;
@@ -176,7 +177,7 @@ function checkSize({ format, file }: Frame, packed: Uint8Array): void {
   if (!stated) throw badDicom(file.name, 'the compressed image could not be decoded: it states no size');
   const { width, height, samples, problem, isCodestream } = stated;
   if (problem) throw badDicom(file.name, problem);
-  const mostOfJ2k = Math.max(FREE_OF_JPEG_2000, OF_JPEG_2000_PER_BYTE * packed.length);
+  const mostOfJ2k = isSmall(packed.length) ? FREE_OF_JPEG_2000 : OF_JPEG_2000_PER_BYTE * packed.length;
   if (isCodestream && rows * columns > mostOfJ2k)
     throw badDicom(
       file.name,

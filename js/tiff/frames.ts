@@ -6,7 +6,7 @@ const LS = 0xf7;
 /** Marker of a scan, of which an image has some ten at most: decoders go through the whole image for each. */
 const SCAN = 0xda;
 /** Most scans, and most pixels of all of them. */
-const [MOST_SCANS, MOST_SCANNED] = [20, 2 ** 28];
+const [MOST_SCANS, MOST_SCANNED] = [20, 2 ** 27];
 
 export interface JpegSize {
   width: number;

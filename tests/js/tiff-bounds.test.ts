@@ -195,8 +195,8 @@ describe('small files of large images', () => {
     };
     expect(await refused(5000, 768)).toMatch(/more than 20 scans/);
     // Fewer of a larger image.
-    expect(await refused(20, 4000)).toMatch(/or 268 million pixels in all of them, is not decoded/);
-    expect(await refused(10, 4000)).not.toMatch(/not decoded/);
+    expect(await refused(20, 4000)).toMatch(/or 134 million pixels in all of them, is not decoded/);
+    expect(await refused(8, 4000)).not.toMatch(/not decoded/);
   });
 });
 
