@@ -202,6 +202,10 @@ export interface MeshInSlices {
   decimateWithin(maxDistance: number, options?: { targetTriangles?: number }): Promise<void>;
   /** As {@link Mesh.smooth}. */
   smooth(options: { iterations: number; keepVolume?: boolean }): Promise<void>;
+  /** As {@link Mesh.cut}. */
+  cut(plane: { origin: Vec3; normal: Vec3 }): Promise<void>;
+  /** As {@link Mesh.contains}, for the surface at the time of the call. */
+  contains(points: PointArray): Promise<Uint8Array>;
   /** As {@link Mesh.toVolume}, for the surface at the time of the call. */
   toVolume(like: Volume, options?: { kind?: VoxelKind; value?: number }): Promise<Volume>;
   /** As {@link Mesh.check}, for the surface at the time of the call. */
@@ -633,10 +637,8 @@ export class Mesh {
    *   nothing would be left, and for the mesh of a model: `clone()` it first. The mesh is then unchanged.
    */
   cut(plane: { origin: Vec3; normal: Vec3 }): void {
-    const { origin, normal } = checkProperties('plane', shallowCopy('plane', plane), ['origin', 'normal']);
-    const point = vec3('plane.origin', origin);
-    const across = nonZero('plane.normal', vec3('plane.normal', normal));
-    this.#edit('cut', (raw) => raw.cut(point, across));
+    const [origin, normal] = checkedPlane(plane);
+    this.#edit('cut', (raw) => raw.cut(origin, normal));
   }
 
   /**
@@ -869,6 +871,14 @@ export class Mesh {
         const [count, keepVolume] = smoothing(options);
         return change('smooth', (raw) => raw.smoothInSlices(count, keepVolume));
       },
+      cut: async (plane) => {
+        const [origin, normal] = checkedPlane(plane);
+        return change('cut', (raw) => raw.cutInSlices(origin, normal));
+      },
+      contains: async (points) => {
+        const array = pointArray('points', points);
+        return this.#work((raw) => raw.containsInSlices(array), slices);
+      },
       toVolume: async (like, options = {}) => {
         const [kind, inside] = voxelQuantity(options);
         const handle = volumeHandle('like', like);
@@ -956,6 +966,12 @@ function triple(numbers: Float64Array): Vec3 {
 function passCodes(passes: readonly RestructurePass[]): Uint8Array {
   const code = (pass: RestructurePass) => RESTRUCTURE_PASSES.indexOf(choice('passes', pass, RESTRUCTURE_PASSES));
   return Uint8Array.from(denseCopy('passes', passes).map(code));
+}
+
+/** Returns the origin and the normal of a plane once they are checked. */
+function checkedPlane(plane: { origin: Vec3; normal: Vec3 }) {
+  const { origin, normal } = checkProperties('plane', shallowCopy('plane', plane), ['origin', 'normal']);
+  return [vec3('plane.origin', origin), nonZero('plane.normal', vec3('plane.normal', normal))] as const;
 }
 
 /** Returns the quantity that {@link Mesh.toVolume} is asked for, and the value inside a mask, once they are checked. */

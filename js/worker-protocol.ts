@@ -218,6 +218,8 @@ export const SLICED: { Mesh: Names<keyof MeshInSlices>; Volume: Names<keyof Volu
     decimate: 'method',
     decimateWithin: 'method',
     smooth: 'method',
+    cut: 'method',
+    contains: 'method',
     toVolume: 'method',
     check: 'method',
     distanceTo: 'method',

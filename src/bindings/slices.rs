@@ -3,10 +3,10 @@
 use std::rc::Rc;
 use std::task::Poll;
 
-use js_sys::Array;
+use js_sys::{Array, Uint8Array};
 use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 
-use super::convert::to_js;
+use super::convert::{point, to_js, world_points};
 use super::error::Failure;
 use super::mesh::{MeshKind, RawMesh, Report, distances, edge_bounds, editable_copy, passes_of, read_only};
 use super::volume::RawVolume;
@@ -14,10 +14,10 @@ use super::voxelise::kind_of;
 use vesicle::mesh::{Mesh, report_in_slices};
 use vesicle::pauses::{Computation, Pauses, advance};
 use vesicle::remesh::{
-    Smoothing, decimate_in_slices, decimate_within_in_slices, passes_in_slices, remesh_in_slices,
-    smooth_in_slices,
+    Plane, Smoothing, cut_by_plane_in_slices, decimate_in_slices, decimate_within_in_slices,
+    passes_in_slices, remesh_in_slices, smooth_in_slices,
 };
-use vesicle::spatial::surface_distance_in_slices;
+use vesicle::spatial::{contains_in_slices, surface_distance_in_slices};
 use vesicle::voxelise::voxelise_in_slices;
 
 /// The results of an operation: the changed mesh, if it is changed, and the value that is returned.
@@ -155,6 +155,29 @@ impl RawMesh {
             smooth_in_slices(mesh, smoothing, pauses).await?;
             Ok(JsValue::UNDEFINED)
         })
+    }
+
+    /// Begins what `cut` does.
+    #[wasm_bindgen(js_name = cutInSlices)]
+    pub fn cut_in_slices(&self, origin: &[f64], normal: &[f64]) -> Result<RawMeshWork, JsValue> {
+        let (origin, normal) = (point(origin)?, point(normal)?);
+        self.change(async move |mesh, pauses| {
+            let plane = Plane { origin: origin - mesh.origin(), normal };
+            cut_by_plane_in_slices(mesh, plane, pauses).await?;
+            Ok(JsValue::UNDEFINED)
+        })
+    }
+
+    /// Begins what `contains` does, of the present surface.
+    #[wasm_bindgen(js_name = containsInSlices)]
+    pub fn contains_in_slices(&self, at: &JsValue) -> Result<RawMeshWork, JsValue> {
+        let (mesh, points) = (self.triangles(), world_points(at)?);
+        Ok(RawMeshWork(Box::pin(async move {
+            let points = points.into_iter().map(|p| p - mesh.origin);
+            let inside = contains_in_slices(&mesh, points, &Pauses::default()).await?;
+            let inside: Vec<u8> = inside.into_iter().map(u8::from).collect();
+            Ok(Done { mesh: None, value: Uint8Array::from(&inside[..]).into() })
+        })))
     }
 
     /// Begins what `toVolume` does, of the present surface; the value is the `RawVolume`.

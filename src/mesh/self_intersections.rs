@@ -29,13 +29,19 @@ pub fn intersecting_pairs(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     pairs.into_iter().map(|pair| [(pair >> 32) as u32, pair as u32]).collect()
 }
 
-/// Returns whether there is any of the [`intersecting_pairs`] for which `counts` holds; stops at the first.
-pub(crate) fn intersect_anywhere(mesh: &TriangleMesh, counts: impl Fn([u32; 2]) -> bool) -> bool {
+/// Returns whether there is any of the [`intersecting_pairs`] for which `counts` holds; stops at the first. Pauses
+/// meanwhile.
+pub(crate) async fn intersect_anywhere(
+    mesh: &TriangleMesh,
+    counts: impl Fn([u32; 2]) -> bool,
+    pauses: &Pauses,
+) -> bool {
     let mut found = false;
-    for_each_tested_pair(mesh, |s, t, intersect| {
+    let visit = |s, t, intersect| {
         found |= intersect && counts([s, t]);
         !found
-    });
+    };
+    visit_tested_pairs(mesh, visit, pauses).await;
     found
 }
 

@@ -34,7 +34,7 @@ pub use clustering::clustered;
 pub use decimate::{decimate, decimate_in_slices, decimate_within, decimate_within_in_slices};
 pub use embedding::{Embedding, PairsOfParts};
 pub use isotropic::{remesh, remesh_in_slices};
-pub use plane_cut::{Plane, cut_by_plane};
+pub use plane_cut::{Plane, cut_by_plane, cut_by_plane_in_slices};
 pub use resolve::{ContactPolicy, Pending, Resolver, TopologyGuide, Unguided};
 pub use restructure::{
     EdgeBounds, EditPolicy, RestructurePass, Unchecked, collapse_short, flip_for_valence, passes_in_slices,

@@ -3,14 +3,16 @@
 use crate::math::predicates::{collinear, in_circle};
 use crate::math::{Bounds, DVec2, DVec3, Vec3, triangulate};
 use crate::mesh::{Mesh, MeshError, OppositeVertices, TriangleMesh, VertexId, intersect_anywhere};
+use crate::pauses::{Pauses, finished};
 use crate::spatial::lone_corner;
 use std::collections::BTreeMap;
 
-/// The number of positions of the plane that are tried, of all and at least of large meshes, and the most triangles that are
-/// cut in all attempts beyond these.
+/// The number of positions of the plane at which no vertex is: all, and those that are tried at least in large meshes; the
+/// most triangles that are cut in all attempts beyond these; and the number of other positions that are tried.
 const ATTEMPTS: usize = 24;
-const LEAST_ATTEMPTS: usize = 4;
+const LEAST_ATTEMPTS: usize = 2;
 const TRIANGLES_CUT: usize = 500_000;
+const OTHER_ATTEMPTS: usize = 2;
 
 /// The least distance of vertices from the plane, relative to the largest coordinate: 16 units in the last place.
 /// Triangles cut nearer to a corner than some of these may degenerate when positions are rounded; with more, few
@@ -40,6 +42,14 @@ pub struct Plane {
 /// inside another that faces the same way. The
 /// mesh is then unchanged.
 pub fn cut_by_plane(mesh: &mut Mesh, plane: Plane) -> Result<(), MeshError> {
+    finished(cut_by_plane_in_slices(mesh, plane, &Pauses::default()))
+}
+
+/// Cuts a mesh as [`cut_by_plane`] does, with pauses. If it is dropped at one of them, the mesh is unchanged.
+///
+/// # Errors
+/// As [`cut_by_plane`].
+pub async fn cut_by_plane_in_slices(mesh: &mut Mesh, plane: Plane, pauses: &Pauses) -> Result<(), MeshError> {
     let heights = plane.heights(mesh)?;
     let present = || mesh.vertices().map(|v| heights[v.index()]);
     if present().all(|height| height <= 0.0) {
@@ -51,15 +61,16 @@ pub fn cut_by_plane(mesh: &mut Mesh, plane: Plane) -> Result<(), MeshError> {
     }
     let largest = mesh.vertices().map(|v| mesh.position(v).abs().max_element()).fold(0.0, f32::max);
     let margin = MARGIN * f64::from(largest);
-    let offsets: Vec<f64> = offsets(margin).collect();
-    let is_clear = |offset: &&f64| present().all(|height| (height - **offset).abs() >= margin);
-    // In a very fine mesh no position is clear; then those near the given one may do as well.
-    let clear = offsets.iter().filter(is_clear);
+    let is_clear = |offset: &f64| present().all(|height| (height - offset).abs() >= margin);
+    let (clear, others): (Vec<f64>, Vec<f64>) = offsets(margin).partition(is_clear);
+    pauses.now().await;
     // Most cuts of large meshes that fail do so since these intersect themselves.
     let attempts = (TRIANGLES_CUT / mesh.triangle_count().max(1)).clamp(LEAST_ATTEMPTS, ATTEMPTS);
-    for offset in clear.take(attempts - 2).chain(&offsets[..2]) {
+    // In a very fine mesh no position is clear; then those near the given one may do as well.
+    let others = others.into_iter().take(OTHER_ATTEMPTS);
+    for offset in clear.into_iter().take(attempts).chain(others) {
         let heights: Vec<f64> = heights.iter().map(|height| height - offset).collect();
-        if let Some(cut) = cut_at(mesh, &heights, plane.normal) {
+        if let Some(cut) = cut_at(mesh, &heights, plane.normal, pauses).await {
             let replaced = std::mem::replace(mesh, cut);
             mesh.advance_versions_past(&replaced);
             return Ok(());
@@ -89,16 +100,19 @@ impl Plane {
 }
 
 /// Returns the part of the mesh below a plane, closed, from the heights of all vertices above it, by slot. `None` if that
-/// part would intersect itself.
-fn cut_at(mesh: &Mesh, heights: &[f64], normal: DVec3) -> Option<Mesh> {
+/// part would intersect itself. Pauses meanwhile.
+async fn cut_at(mesh: &Mesh, heights: &[f64], normal: DVec3, pauses: &Pauses) -> Option<Mesh> {
     let mut part = OpenPart::new(mesh, heights);
     let points: Vec<DVec2> =
         part.surface.positions[part.rim_start as usize..].iter().map(|&p| projected(p, normal)).collect();
+    pauses.now().await;
     let cap = triangulate(&points, &part.rims()?)?;
+    pauses.now().await;
     part.surface.triangles.extend(cap.into_iter().map(|corners| corners.map(|k| part.rim_start + k)));
     let mut closed = Mesh::from_triangles(&part.surface).ok()?;
-    make_delaunay(&mut closed, part.rim_start, &points);
-    is_sound(&closed, part.rim_start).then_some(closed)
+    pauses.now().await;
+    make_delaunay(&mut closed, part.rim_start, &points, pauses).await;
+    is_sound(&closed, part.rim_start, pauses).await.then_some(closed)
 }
 
 /// Projects a point along the axis nearest to the normal. Exact, and counter-clockwise is as seen against the normal.
@@ -191,11 +205,12 @@ impl OpenPart {
 }
 
 /// Flips edges between triangles on the plane until these are a constrained Delaunay triangulation. Vertices from
-/// `rim_start` on are on the plane, at `points`.
-fn make_delaunay(mesh: &mut Mesh, rim_start: u32, points: &[DVec2]) {
+/// `rim_start` on are on the plane, at `points`. Pauses meanwhile.
+async fn make_delaunay(mesh: &mut Mesh, rim_start: u32, points: &[DVec2], pauses: &Pauses) {
     let is_rim = |v: VertexId| v.0 >= rim_start;
     let mut queue: Vec<_> = mesh.edges().filter(|&(u, v)| is_rim(u) && is_rim(v)).collect();
     while let Some((u, v)) = queue.pop() {
+        pauses.after(1).await;
         let Ok(OppositeVertices { left, right }) = mesh.opposite_vertices(u, v) else { continue };
         if !is_rim(left) || !is_rim(right) {
             continue;
@@ -207,8 +222,9 @@ fn make_delaunay(mesh: &mut Mesh, rim_start: u32, points: &[DVec2]) {
     }
 }
 
-/// Returns whether no triangle with a vertex on the plane, from `rim_start` on, is degenerate or intersects another.
-fn is_sound(mesh: &Mesh, rim_start: u32) -> bool {
+/// Returns whether no triangle with a vertex on the plane, from `rim_start` on, is degenerate or intersects another. Pauses
+/// meanwhile.
+async fn is_sound(mesh: &Mesh, rim_start: u32, pauses: &Pauses) -> bool {
     let is_new = |corners: &[u32; 3]| corners.iter().any(|&v| v >= rim_start);
     let positions = mesh.positions().to_vec();
     let points_of = |corners: &[u32; 3]| corners.map(|v| positions[v as usize]);
@@ -221,5 +237,5 @@ fn is_sound(mesh: &Mesh, rim_start: u32) -> bool {
     triangles.retain(|corners| Bounds::from_points(&points_of(corners)).overlaps(&near));
     let surface = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
     let is_of_new = |t: u32| is_new(&surface.triangles[t as usize]);
-    !intersect_anywhere(&surface, |pair| pair.into_iter().any(is_of_new))
+    !intersect_anywhere(&surface, |pair| pair.into_iter().any(is_of_new), pauses).await
 }

@@ -4,6 +4,7 @@ use super::TriangleTree;
 use crate::math::crossing::{crossing, is_beyond};
 use crate::math::{Bounds, DVec2, DVec3, Vec3};
 use crate::mesh::{MeshError, TriangleMesh};
+use crate::pauses::{Pauses, finished};
 
 /// Returns for each point, relative to the origin of the mesh, whether it is inside a closed mesh: whether its winding
 /// number, the number of times the surface encloses it, is not 0. False for points that are not finite.
@@ -18,28 +19,54 @@ pub fn contains(
     mesh: &TriangleMesh,
     points: impl IntoIterator<Item = DVec3>,
 ) -> Result<Vec<bool>, MeshError> {
-    mesh.check_closed()?;
-    let tree = TriangleTree::new(mesh)?;
-    // Beyond the range of single precision there is no mesh.
-    let is_inside = |p: DVec3| p.as_vec3().is_finite() && winding_number(mesh, &tree, p) != 0;
-    Ok(points.into_iter().map(is_inside).collect())
+    finished(contains_in_slices(mesh, points, &Pauses::default()))
 }
 
-/// Returns the winding number of a point, from the triangles between it and infinity at low x.
-fn winding_number(mesh: &TriangleMesh, tree: &TriangleTree, p: DVec3) -> i32 {
+/// Does what [`contains`] does, and pauses meanwhile.
+///
+/// # Errors
+/// As [`contains`].
+pub async fn contains_in_slices(
+    mesh: &TriangleMesh,
+    points: impl IntoIterator<Item = DVec3>,
+    pauses: &Pauses,
+) -> Result<Vec<bool>, MeshError> {
+    mesh.check_closed()?;
+    pauses.now().await;
+    let tree = TriangleTree::in_slices(mesh, pauses).await?;
+    let mut inside = Vec::new();
+    for p in points {
+        let (mut winding, mut crossed) = (0, 0);
+        // Beyond the range of single precision there is no mesh.
+        if p.as_vec3().is_finite() {
+            (winding, crossed) = winding_number(mesh, &tree, p);
+        }
+        inside.push(winding != 0);
+        pauses.after(1 + crossed / TRIANGLES_PER_UNIT).await;
+    }
+    Ok(inside)
+}
+
+/// Number of triangles along a line that are a unit of work.
+const TRIANGLES_PER_UNIT: usize = 64;
+
+/// Returns the winding number of a point, from the triangles between it and infinity at low x, and the number of those whose
+/// boxes are there.
+fn winding_number(mesh: &TriangleMesh, tree: &TriangleTree, p: DVec3) -> (i32, usize) {
     // Rounding is monotonic, so a line that meets a box of single precision still does when it is rounded.
     let end = p.as_vec3();
     let line = Bounds { min: Vec3::new(f32::NEG_INFINITY, end.y, end.z), max: end };
     let at = DVec2::new(p.y, p.z);
-    let mut winding = 0;
+    let (mut winding, mut triangles) = (0, 0);
     tree.for_each_overlapping(&line, |t| {
+        triangles += 1;
         let corners = mesh.triangles[t as usize].map(|v| mesh.positions[v as usize].as_dvec3());
         let crossing = crossing(corners, at);
         if crossing != 0 && is_beyond(corners, crossing, p) {
             winding += crossing;
         }
     });
-    winding
+    (winding, triangles)
 }
 
 #[cfg(test)]

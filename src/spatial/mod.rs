@@ -17,7 +17,7 @@ mod vertex_grid;
 
 pub use cavities::outer_components;
 pub use cells::CellSet;
-pub use contains::contains;
+pub use contains::{contains, contains_in_slices};
 pub use distance::{SurfaceDistance, surface_distance, surface_distance_in_slices};
 pub use lattice_distance::lattice_distances;
 pub use points::PointGrid;

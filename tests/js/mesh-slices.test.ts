@@ -28,13 +28,15 @@ const OPERATIONS: Record<keyof MeshInSlices, (mesh: Mesh | MeshInSlices) => unkn
   decimate: (mesh) => mesh.decimate(1000.5),
   decimateWithin: (mesh) => mesh.decimateWithin(0.01, { targetTriangles: 500 }),
   smooth: (mesh) => mesh.smooth({ iterations: 3 }),
+  cut: (mesh) => mesh.cut({ origin: [0.1, 0, 0], normal: [1, 2, 3] }),
+  contains: (mesh) => mesh.contains(Float32Array.from({ length: 9000 }, (_, k) => (k * 0.618) % 1.5)),
   toVolume: async (mesh) => (await mesh.toVolume(GRID, { kind: 'distance' })).intensities(),
   check: (mesh) => mesh.check(),
   distanceTo: (mesh) => mesh.distanceTo(OTHER),
 };
 
 const NAMES = Object.keys(OPERATIONS) as (keyof MeshInSlices)[];
-const READS: (keyof MeshInSlices)[] = ['toVolume', 'check', 'distanceTo'];
+const READS: (keyof MeshInSlices)[] = ['contains', 'toVolume', 'check', 'distanceTo'];
 const CHANGES = NAMES.filter((name) => !READS.includes(name));
 
 /** Everything that may be seen of a mesh. */
