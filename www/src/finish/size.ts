@@ -6,8 +6,8 @@ import { Refusal } from '../worker/refusal';
 import { callOf } from './code';
 import type { Edit } from './protocol';
 
-/** Most vertices that an edit of a session in a small file may give: with more, the page takes over a gigabyte. */
-export const MOST_OF_SMALL = 500_000;
+/** Most vertices that an edit of a session in a small file may give: with more, the page draws for a second after each. */
+export const MOST_OF_SMALL = 200_000;
 
 /**
  * Vertices of remeshed triangles on an area, times the product of the bounds of their edges, as measured: a fifth more than

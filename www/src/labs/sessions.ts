@@ -2,7 +2,7 @@ import type { Finish } from '../finish';
 import { anyForeign, noted } from '../importers';
 import { isLesson } from '../lessons/recognise';
 import type { Session, SourceFile } from '../session/file';
-import { isSession } from '../session/recognise';
+import { isNamedSession, isSession } from '../session/recognise';
 import { areSmall } from '../small-files';
 import { text } from '../texts';
 import { readFiles } from '../ui/files';
@@ -49,17 +49,21 @@ export class Sessions {
     this.#lab = lab;
   }
 
-  /** Opens files: a session, the data that one waits for, or other data. */
+  /** Opens files: a session, with its data if these are not in it, the data that one waits for, or other data. */
   async files(files: File[]): Promise<void> {
     const [file] = files;
     const { states, opening } = this.#lab;
     if (!(await this.#lab.mayReplace())) return;
     try {
       if (await isLesson(files)) throw new Error(text('lessons.elsewhere'));
-      const isOne = file && files.length === 1 && (await isSession(file));
+      const session = await sessionAmong(files);
       // Another session takes the place of the one that waits for its data, even if it is damaged.
-      if (isOne) this.#waiting = undefined;
-      if (isOne) await this.#read(file);
+      if (session) this.#waiting = undefined;
+      if (session)
+        await this.#read(
+          session,
+          files.filter((one) => one !== session),
+        );
       else if (this.#waiting) await this.#complete(this.#waiting, files);
       else await opening.files(files);
     } catch (error) {
@@ -116,21 +120,26 @@ export class Sessions {
     }
   }
 
-  async #read(file: File): Promise<void> {
+  /** Opens a session; `beside`: the data that it waits for, if they are there already. */
+  async #read(file: File, beside: File[]): Promise<void> {
     const { readApart } = await import('../session/apart');
     const read = await readApart(new Uint8Array(await file.arrayBuffer()));
     const session: Session = { ...read, isSmall: areSmall([file]) };
-    if (session.lab === this.#lab.id) await this.#open(session);
+    if (beside.length > 0) {
+      if (session.lab !== this.#lab.id || !waits(session)) throw new Error(text('sessions.alone'));
+      this.#waiting = session;
+      await this.#complete(session, beside);
+    } else if (session.lab === this.#lab.id) await this.#open(session);
     else this.#lab.passOn({ lab: session.lab, session, name: '', bytes: new Uint8Array(), params: {} });
   }
 
   /** Opens a session, or asks for its data if it has none. */
   async #open(session: Session): Promise<void> {
     const { opening, ui } = this.#lab;
-    const { example, files, name } = session.source;
+    const { files, name } = session.source;
     this.#waiting = undefined;
     if (files.every(({ content }) => content)) return this.#restore(session, files.map(fileOf));
-    if (example !== undefined) return this.#restore(session, []);
+    if (!waits(session)) return this.#restore(session, []);
     if (!opening.source) await opening.default();
     this.#waiting = session;
     ui.banner.show(text('sessions.needsData'), text('sessions.needsDataHint', { name }));
@@ -160,5 +169,19 @@ export class Sessions {
     );
   }
 }
+
+/** Returns the session among files that are opened together, if there is one. */
+async function sessionAmong(files: File[]): Promise<File | undefined> {
+  const [file] = files;
+  if (file && files.length === 1) return (await isSession(file)) ? file : undefined;
+  // Of a folder of thousands of slices not each is read.
+  const [session, ...more] = files.filter(isNamedSession);
+  if (more.length > 0) throw new Error(text('sessions.alone'));
+  return session;
+}
+
+/** Returns whether a session has neither its data nor an example. */
+const waits = ({ source: { files, example } }: Session) =>
+  example === undefined && !files.every(({ content }) => content);
 
 const fileOf = ({ name, content, notes }: SourceFile) => noted(new File([content as BlobPart], name), notes);
