@@ -122,11 +122,19 @@ async function isMade(module, way, sources) {
   return existsSync(file) && (await readFile(file, 'utf8')) === stampOf(way, sources);
 }
 
+let generator;
+
+/** Compiles what makes the glue of modules, once; beside a module, whose compilation does not always occupy two processors. */
+function compileGenerator() {
+  generator ??= must('cargo', ['build', '--locked', '--package', 'xtask', '--target-dir', at('target/xtask')]);
+  return generator;
+}
+
 /** Compiles a module, and makes its glue, unless that was done from the same `sources`. */
 async function make(module, way, sources) {
   if (await isMade(module, way, sources)) return;
   const into = folder(module);
-  const compiled = await compileInTurn(module, way);
+  const [compiled] = await Promise.all([compileInTurn(module, way), compileGenerator()]);
   await rm(into, { recursive: true, force: true });
   await must('cargo', [
     ...['run', '--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')],
