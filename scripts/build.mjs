@@ -122,19 +122,11 @@ async function isMade(module, way, sources) {
   return existsSync(file) && (await readFile(file, 'utf8')) === stampOf(way, sources);
 }
 
-let generator;
-
-/** Compiles what makes the glue of modules, once; beside a module, whose compilation does not always occupy two processors. */
-function compileGenerator() {
-  generator ??= must('cargo', ['build', '--locked', '--package', 'xtask', '--target-dir', at('target/xtask')]);
-  return generator;
-}
-
 /** Compiles a module, and makes its glue, unless that was done from the same `sources`. */
 async function make(module, way, sources) {
   if (await isMade(module, way, sources)) return;
   const into = folder(module);
-  const [compiled] = await Promise.all([compileInTurn(module, way), compileGenerator()]);
+  const compiled = await compileInTurn(module, way);
   await rm(into, { recursive: true, force: true });
   await must('cargo', [
     ...['run', '--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')],
@@ -229,35 +221,30 @@ async function manifest(modules) {
  * where nothing changed. `quick`: the latter with one module, not optimised as a whole, in place of each other, unless the
  * others are there.
  */
-export async function build(options) {
+export async function build({ plain = true, quick = false } = {}) {
   const started = performance.now();
-  await assemble(await makeModules(options));
+  const sources = await sourceHash();
+  const areMade = await Promise.all(MODULES.map((module) => isMade(module, WAYS.release, sources)));
+  if (quick && areMade.includes(false)) await buildQuick(sources);
+  else await buildAll(plain && !quick ? [...MODULES, PLAIN] : MODULES, sources);
   const size = (await stat(at('pkg/vesicle_bg.wasm'))).size;
   say('pkg', `${Math.round(size / 1000)} kB of wasm, ${((performance.now() - started) / 1000).toFixed(1)} s`);
 }
 
-/** Makes the modules of `build`, and returns them. The quick ones need no npm package. */
-export async function makeModules({ plain = true, quick = false } = {}) {
-  const sources = await sourceHash();
-  const areMade = await Promise.all(MODULES.map((module) => isMade(module, WAYS.release, sources)));
-  if (quick && areMade.includes(false)) return makeQuick(sources);
-  return makeAll(plain && !quick ? [...MODULES, PLAIN] : MODULES, sources);
-}
-
-async function makeAll(modules, sources) {
+async function buildAll(modules, sources) {
   await Promise.all(modules.map((module) => make(module, WAYS.release, sources)));
   if (modules.includes(PLAIN)) await compareGlue();
-  return modules;
+  await assemble(modules);
 }
 
 /** The whole library stands in for its parts, which have the same classes. */
-async function makeQuick(sources) {
+async function buildQuick(sources) {
   for (const module of [WHOLE, READERS]) await make(module, WAYS.quick, sources);
   for (const module of METHOD_MODULES) {
     await rm(folder(module), { recursive: true, force: true });
     await cp(folder(WHOLE), folder(module), { recursive: true });
   }
-  return MODULES;
+  await assemble(MODULES);
 }
 
 if (startedAs(import.meta.url)) {

@@ -45,8 +45,7 @@ async function addTarget() {
   say('wasm target', 'added');
 }
 
-/** Installs what the lock file of npm names. */
-export async function installPackages() {
+async function installPackages() {
   const installed = at('node_modules', '.package-lock.json');
   const fresh = existsSync(installed) && statSync(installed).mtimeMs >= statSync(at('package-lock.json')).mtimeMs;
   if (fresh) return say('packages', 'present');
@@ -75,16 +74,11 @@ async function installChromium() {
   return findChromium();
 }
 
-/** Sets up what compiles Rust. Throws if something is missing that this script must not install. */
-export async function setupCompilers() {
+/** Runs all parts of the set-up in order. Throws if something is missing that this script must not install. */
+export async function setup({ browser = true } = {}) {
   checkNode();
   await checkRust();
   await addTarget();
-}
-
-/** Runs all parts of the set-up in order. Throws as `setupCompilers`. */
-export async function setup({ browser = true } = {}) {
-  await setupCompilers();
   await installPackages();
   if (browser) await findOrInstallChromium();
 }

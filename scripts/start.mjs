@@ -1,9 +1,9 @@
 // Sets up, builds the package and the app, and serves it on PORT; by default on 5173 or, if that is taken, any free
 // port.
 import { buildApp } from './app.mjs';
-import { build, makeModules } from './build.mjs';
+import { build } from './build.mjs';
 import { serveApp } from './serve.mjs';
-import { installPackages, setupCompilers } from './setup.mjs';
+import { setup } from './setup.mjs';
 import { at, say, script } from './shell.mjs';
 
 async function listen() {
@@ -13,9 +13,7 @@ async function listen() {
 }
 
 await script(async () => {
-  await setupCompilers();
-  // Packages are mostly waited for, so it is done beside the compilation.
-  await Promise.all([installPackages(), makeModules({ quick: true })]);
+  await setup({ browser: false });
   await build({ quick: true });
   await buildApp();
   const { address } = await listen();
