@@ -9,8 +9,8 @@ const LIMIT = 1 << 27;
 /** Number of decoded bytes for each byte of the file that may always be made: few meshes are compressed so well. */
 const GROWTH = 64;
 
-/** Number of bytes that small files may decode to: twice as much as for the best compressed. */
-const LIMIT_OF_SMALL = 1 << 24;
+/** Number of bytes that small files may decode to: as much as the best compressed, and as plain ones. */
+const LIMIT_OF_SMALL = 1 << 23;
 
 /** Returns the largest number of bytes that files of a given size may decode to. */
 const limitOf = (fileBytes: number): number =>
