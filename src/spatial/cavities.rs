@@ -1,7 +1,7 @@
 //! Components of a surface that are enclosed by others, such as the walls of cavities.
 
 use super::contains;
-use crate::math::Bounds;
+use crate::math::{Bounds, BoxTree};
 use crate::mesh::{MeshError, TriangleMesh, measure};
 
 /// Returns the indices of the connected components that no larger one encloses, as numbered by
@@ -15,12 +15,18 @@ pub fn outer_components(mesh: &TriangleMesh) -> Result<Vec<u32>, MeshError> {
     let components = mesh.components();
     let bounds: Vec<Bounds> = components.iter().map(|part| Bounds::from_points(&part.positions)).collect();
     let volumes: Vec<f64> = components.iter().map(|part| measure(part).volume.abs()).collect();
+    let tree = BoxTree::new(&bounds);
     let mut is_enclosed = vec![false; components.len()];
     for (j, outer) in components.iter().enumerate() {
         let is_candidate = |i: usize| {
             i != j && !is_enclosed[i] && volumes[i] < volumes[j] && bounds[j].contains_box(&bounds[i])
         };
-        let candidates: Vec<usize> = (0..components.len()).filter(|&i| is_candidate(i)).collect();
+        let mut candidates = Vec::new();
+        tree.for_each_overlapping(&bounds[j], |i| {
+            if is_candidate(i as usize) {
+                candidates.push(i as usize);
+            }
+        });
         if candidates.is_empty() {
             continue;
         }

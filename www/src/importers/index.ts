@@ -4,6 +4,7 @@
  * the series gets further than this.
  */
 import type { FileNotes } from '../protocol';
+import { isNamedSession } from '../session/recognise';
 import { text } from '../texts';
 import { hasName, setName } from '../ui/folders';
 import { type Chosen, VolumeChoice } from '../ui/volume-choice';
@@ -32,7 +33,8 @@ export function noted(file: File, known: FileNotes | undefined): File {
  * they are: opening them says why.
  */
 export async function admitted(files: File[], admission: Admission): Promise<File[] | undefined> {
-  if (admission === 'any' || files.length === 0) return files;
+  // Data beside a session are its own.
+  if (admission === 'any' || files.length === 0 || files.some(isNamedSession)) return files;
   const foreign = await foreignAmong(files).catch(() => []);
   if (foreign.length > 0) return imported(files, foreign, admission);
   return admission === 'volume' ? oneOf(files) : files;
