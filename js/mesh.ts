@@ -204,6 +204,8 @@ export interface MeshInSlices {
   smooth(options: { iterations: number; keepVolume?: boolean }): Promise<void>;
   /** As {@link Mesh.cut}. */
   cut(plane: { origin: Vec3; normal: Vec3 }): Promise<void>;
+  /** As {@link Mesh.removeCavities}. */
+  removeCavities(): Promise<void>;
   /** As {@link Mesh.contains}, for the surface at the time of the call. */
   contains(points: PointArray): Promise<Uint8Array>;
   /** As {@link Mesh.toVolume}, for the surface at the time of the call. */
@@ -875,6 +877,7 @@ export class Mesh {
         const [origin, normal] = checkedPlane(plane);
         return change('cut', (raw) => raw.cutInSlices(origin, normal));
       },
+      removeCavities: async () => change('removeCavities', (raw) => raw.removeCavitiesInSlices()),
       contains: async (points) => {
         const array = pointArray('points', points);
         return this.#work((raw) => raw.containsInSlices(array), slices);

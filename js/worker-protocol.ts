@@ -219,6 +219,7 @@ export const SLICED: { Mesh: Names<keyof MeshInSlices>; Volume: Names<keyof Volu
     decimateWithin: 'method',
     smooth: 'method',
     cut: 'method',
+    removeCavities: 'method',
     contains: 'method',
     toVolume: 'method',
     check: 'method',

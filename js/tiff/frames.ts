@@ -5,8 +5,8 @@ const LS = 0xf7;
 
 /** Marker of a scan, of which an image has some ten at most: decoders go through the whole image for each. */
 const SCAN = 0xda;
-/** Most scans, and most pixels of all of them. */
-const [MOST_SCANS, MOST_SCANNED] = [20, 2 ** 27];
+/** Most scans, and most pixels of all of them: so many, or more for each byte. */
+const [MOST_SCANS, MOST_SCANNED, SCANNED_PER_BYTE] = [20, 2 ** 27, 1000];
 
 export interface JpegSize {
   width: number;
@@ -17,7 +17,8 @@ export interface JpegSize {
 
 /** Problem of a JPEG of very many scans. */
 export const TOO_MANY_SCANS =
-  `a JPEG of more than ${MOST_SCANS} scans, or ${Math.floor(MOST_SCANNED / 1e6)} million pixels in all of them, ` +
+  `a JPEG of more than ${MOST_SCANS} scans, or ${Math.floor(MOST_SCANNED / 1e6)} million pixels in all of them ` +
+  `and ${SCANNED_PER_BYTE} for each byte, ` +
   'is not decoded: it would take long';
 
 /** Returns the size in the header of a JPEG; undefined if it has not exactly one. */
@@ -39,7 +40,8 @@ export function jpegSize(bytes: Uint8Array): (JpegSize & { hasManyScans: boolean
   }
   const [size] = found;
   if (!size || found.length !== 1) return undefined;
-  const hasManyScans = scans > MOST_SCANS || scans * size.width * size.height > MOST_SCANNED;
+  const mostScanned = Math.max(MOST_SCANNED, SCANNED_PER_BYTE * bytes.length);
+  const hasManyScans = scans > MOST_SCANS || scans * size.width * size.height > mostScanned;
   return { ...size, hasManyScans };
 }
 

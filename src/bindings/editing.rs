@@ -7,6 +7,7 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::point;
 use super::error::Failure;
 use super::mesh::{MeshKind, RawMesh, read_only};
+use vesicle::mesh::TriangleMesh;
 use vesicle::remesh::{Plane, cut_by_plane};
 use vesicle::spatial::outer_components;
 
@@ -22,12 +23,9 @@ impl RawMesh {
     /// Removes all connected components but those of the given indices.
     #[wasm_bindgen(js_name = keepComponents)]
     pub fn keep_components(&mut self, indices: &[u32]) -> Result<(), JsValue> {
-        if matches!(self.0, MeshKind::Live(_)) {
-            return Err(read_only().into());
-        }
-        let kept = self.triangles().with_components(indices).map_err(Failure::from)?;
-        let [topology, geometry] = [self.topology_version(), self.geometry_version()];
-        self.0 = MeshKind::Triangles(Rc::new(kept), [topology.wrapping_add(1), geometry.wrapping_add(1)]);
+        let (mesh, versions) = self.to_be_replaced()?;
+        let kept = mesh.with_components(indices).map_err(Failure::from)?;
+        self.0 = MeshKind::Triangles(Rc::new(kept), versions);
         Ok(())
     }
 
@@ -36,5 +34,16 @@ impl RawMesh {
     pub fn remove_cavities(&mut self) -> Result<(), JsValue> {
         let outer = outer_components(&self.triangles()).map_err(Failure::from)?;
         self.keep_components(&outer)
+    }
+}
+
+impl RawMesh {
+    /// Returns the triangles of a mesh that may be changed, and the versions of a list of triangles that takes its place.
+    pub(super) fn to_be_replaced(&self) -> Result<(Rc<TriangleMesh>, [u32; 2]), Failure> {
+        if matches!(self.0, MeshKind::Live(_)) {
+            return Err(read_only());
+        }
+        let versions = [self.topology_version(), self.geometry_version()];
+        Ok((self.triangles(), versions.map(|version| version.wrapping_add(1))))
     }
 }

@@ -17,12 +17,12 @@ use vesicle::remesh::{
     Plane, Smoothing, cut_by_plane_in_slices, decimate_in_slices, decimate_within_in_slices,
     passes_in_slices, remesh_in_slices, smooth_in_slices,
 };
-use vesicle::spatial::{contains_in_slices, surface_distance_in_slices};
+use vesicle::spatial::{contains_in_slices, outer_components_in_slices, surface_distance_in_slices};
 use vesicle::voxelise::voxelise_in_slices;
 
 /// The results of an operation: the changed mesh, if it is changed, and the value that is returned.
 struct Done {
-    mesh: Option<Box<Mesh>>,
+    mesh: Option<MeshKind>,
     value: JsValue,
 }
 
@@ -38,7 +38,7 @@ impl RawMeshWork {
         let Poll::Ready(done) = advance(&mut self.0) else { return Ok(None) };
         let Done { mesh: changed, value } = done?;
         if let Some(changed) = changed {
-            mesh.0 = MeshKind::Surface(changed);
+            mesh.0 = changed;
         }
         Ok(Some(Array::of(&[value])))
     }
@@ -55,7 +55,7 @@ impl RawMesh {
             let (mut mesh, pauses) = (copy.into_mesh()?, Pauses::default());
             pauses.now().await;
             let value = edit(&mut mesh, &pauses).await?;
-            Ok(Done { mesh: Some(mesh), value })
+            Ok(Done { mesh: Some(MeshKind::Surface(mesh)), value })
         })))
     }
 
@@ -166,6 +166,17 @@ impl RawMesh {
             cut_by_plane_in_slices(mesh, plane, pauses).await?;
             Ok(JsValue::UNDEFINED)
         })
+    }
+
+    /// Begins what `removeCavities` does.
+    #[wasm_bindgen(js_name = removeCavitiesInSlices)]
+    pub fn remove_cavities_in_slices(&self) -> Result<RawMeshWork, JsValue> {
+        let (mesh, versions) = self.to_be_replaced()?;
+        Ok(RawMeshWork(Box::pin(async move {
+            let outer = outer_components_in_slices(&mesh, &Pauses::default()).await?;
+            let kept = Rc::new(mesh.with_components(&outer)?);
+            Ok(Done { mesh: Some(MeshKind::Triangles(kept, versions)), value: JsValue::UNDEFINED })
+        })))
     }
 
     /// Begins what `contains` does, of the present surface.

@@ -106,7 +106,14 @@ impl Mesh {
         for was in &self.journal.touched {
             let ring = self.ring(was.vertex);
             let all = was.ring.is_empty() || was.position != self.position(was.vertex);
-            let pairs = ring.pairs().filter(|&(a, b)| all || was.ring.after(a) != Some(b));
+            // Most neighbours of a hub with thousands follow each other as before.
+            let mut before = 0;
+            let mut is_as_before = |a, b| {
+                let Some(k) = was.ring.position_from(before, a) else { return false };
+                before = if k + 1 == was.ring.valence() { 0 } else { k + 1 };
+                was.ring.as_slice()[before] == b
+            };
+            let pairs = ring.pairs().filter(|&(a, b)| all || !is_as_before(a, b));
             found.extend(pairs.map(|(a, b)| rank([was.vertex, a, b])));
         }
         for v in (self.journal.slots..self.slots()).map(VertexId::from_index) {

@@ -60,7 +60,9 @@ pub use origin::{WorldPositions, grid_origin, world_origin};
 pub use patch::{Patch, PatchCorner};
 pub use report::{MeshReport, report, report_in_slices};
 pub use ring::Ring;
-pub(crate) use self_intersections::{CountInTime, count_in_time, intersect_anywhere, intersecting_parts};
+pub(crate) use self_intersections::{
+    CountInTime, count_in_time, count_self_intersections_in_slices, intersect_anywhere, intersecting_parts,
+};
 pub use self_intersections::{Facet, count_self_intersections, facets_intersect, intersecting_pairs};
 pub use size::MAX_VERTICES;
 pub use surgery::{Cut, TubeRims};

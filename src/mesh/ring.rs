@@ -66,6 +66,14 @@ impl Ring {
         Some(self.0[if here == 0 { self.0.len() - 1 } else { here - 1 }])
     }
 
+    /// Returns the index of `v` as [`Self::position`] does; fast if it is a little after `start`, or at it.
+    #[inline]
+    pub(crate) fn position_from(&self, start: usize, v: VertexId) -> Option<usize> {
+        let is_v = |&w: &VertexId| w == v;
+        let (before, from) = self.0.split_at(start.min(self.0.len()));
+        from.iter().position(is_v).map(|k| before.len() + k).or_else(|| before.iter().position(is_v))
+    }
+
     /// Iterates over pairs of consecutive neighbours `(a, b)`, cyclically; each pair forms a triangle with the vertex
     /// of the ring.
     pub fn pairs(&self) -> impl Iterator<Item = (VertexId, VertexId)> + '_ {

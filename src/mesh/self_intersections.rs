@@ -50,11 +50,17 @@ pub(crate) async fn intersect_anywhere(
 /// Memory is linear in the number of triangles. So is time if few bounding boxes of triangles overlap; it is quadratic
 /// if all do.
 pub fn count_self_intersections(mesh: &TriangleMesh) -> usize {
+    finished(count_self_intersections_in_slices(mesh, &Pauses::default()))
+}
+
+/// Does what [`count_self_intersections`] does, and pauses meanwhile.
+pub(crate) async fn count_self_intersections_in_slices(mesh: &TriangleMesh, pauses: &Pauses) -> usize {
     let mut count = 0;
-    for_each_tested_pair(mesh, |_, _, intersect| {
+    let visit = |_, _, intersect| {
         count += usize::from(intersect);
         true
-    });
+    };
+    visit_tested_pairs(mesh, visit, pauses).await;
     count
 }
 

@@ -2,7 +2,7 @@
 
 use super::MethodError;
 use crate::mesh::{
-    CountInTime, Mesh, MeshError, TriangleMesh, count_in_time, count_self_intersections, measure,
+    CountInTime, Mesh, MeshError, TriangleMesh, count_in_time, count_self_intersections_in_slices, measure,
 };
 use crate::pauses::Pauses;
 
@@ -31,10 +31,12 @@ pub(super) async fn checked_mesh(
     match count_in_time(mesh, pauses).await {
         CountInTime { found: 0, is_complete: true } => Ok(surface),
         // Not all pairs were tested.
-        CountInTime { found: 0, is_complete: false } => match count_self_intersections(mesh) {
-            0 => Ok(surface),
-            pairs => Err(MeshError::SelfIntersecting { pairs }.into()),
-        },
+        CountInTime { found: 0, is_complete: false } => {
+            match count_self_intersections_in_slices(mesh, pauses).await {
+                0 => Ok(surface),
+                pairs => Err(MeshError::SelfIntersecting { pairs }.into()),
+            }
+        }
         CountInTime { found: pairs, .. } => Err(MeshError::SelfIntersecting { pairs }.into()),
     }
 }

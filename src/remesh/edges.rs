@@ -17,6 +17,12 @@ const LENGTHENED: f32 = 1.6;
 /// scan they used up the work of a whole call, 20 s.
 const MAX_EDITS: u8 = 40;
 
+/// The valence above which an edit takes long.
+const WIDE: usize = 128;
+
+/// Number of triangles around vertices that are tested in a unit of work.
+const TESTED_PER_UNIT: usize = 32;
+
 impl Resolver {
     /// Brings the lengths of edges around queued vertices within bounds where possible, until the queue is empty or the
     /// work limit of the resolver's call is reached.
@@ -30,8 +36,15 @@ impl Resolver {
         while self.embedding.effort() < self.max_effort {
             let Some(u) = self.pop() else { return };
             pauses.after(1).await;
-            if mesh.is_live(u) && self.may_edit(u) {
-                self.restore_vertex(mesh, sampling, guide, u);
+            if !mesh.is_live(u) || !self.may_edit(u) {
+                continue;
+            }
+            let mut next = Some(0);
+            while let Some(k) = next {
+                let tested = self.embedding.tested_around();
+                next = self.restore_vertex(mesh, sampling, guide, u, k);
+                let tested = self.embedding.tested_around() - tested;
+                pauses.after(tested as usize / TESTED_PER_UNIT).await;
             }
         }
     }
@@ -65,16 +78,19 @@ impl Resolver {
     }
 
     /// Edits the first edge around `u` whose length is out of bounds, to bring it within them; if an edit is rejected,
-    /// tries the next such edge.
+    /// tries the next such edge. Begins with the neighbour of index `first`; if edits of a vertex of very many neighbours
+    /// are rejected, which takes long, returns now and then the index to go on from.
     fn restore_vertex(
         &mut self,
         mesh: &mut Mesh,
         sampling: Sampling,
         guide: &dyn TopologyGuide,
         u: VertexId,
-    ) {
+        first: usize,
+    ) -> Option<usize> {
         let from = mesh.position(u);
-        for k in 0..mesh.ring(u).valence() {
+        let valence = mesh.ring(u).valence();
+        for k in first..valence {
             let v = mesh.ring(u).as_slice()[k];
             let length = from.distance_squared(mesh.position(v));
             let bounds = sampling.between(mesh, u, v);
@@ -85,11 +101,17 @@ impl Resolver {
             } else {
                 Ok(false)
             };
-            if edited == Ok(true) {
-                self.count_edit(u);
-                return;
+            match edited {
+                Ok(true) => {
+                    self.count_edit(u);
+                    return None;
+                }
+                Ok(false) => {}
+                Err(_) if valence > WIDE => return Some(k + 1),
+                Err(_) => {}
             }
         }
+        None
     }
 
     /// Removes an edge that is too long: flips it if a vertex at its midpoint would be too near an opposite one and the

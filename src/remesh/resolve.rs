@@ -422,7 +422,9 @@ fn mark(flags: &mut Vec<bool>, v: VertexId) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Unguided;
     use super::*;
+    use crate::mesh::TriangleMesh;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -450,5 +452,28 @@ mod tests {
         }
         // Joins add a few vertices even after splitting has stopped.
         assert!(mesh.vertex_count() <= 520);
+    }
+
+    /// Regression: edits beside two hubs of 4,000 neighbours, each of which looked at all of these, took 3 s between pauses.
+    #[test]
+    fn edits_beside_hubs_pause() {
+        const RIM: u32 = 300;
+        let at = |k: u32| {
+            let angle = f64::from(k) / f64::from(RIM) * std::f64::consts::TAU;
+            Vec3::new(libm::cos(angle) as f32, libm::sin(angle) as f32, 0.0)
+        };
+        let mut cone = TriangleMesh { positions: vec![Vec3::Z, -Vec3::Z], ..TriangleMesh::default() };
+        cone.positions.extend((0..RIM).map(at));
+        for (u, v) in (0..RIM).map(|k| (2 + k, 2 + (k + 1) % RIM)) {
+            cone.triangles.extend([[0, u, v], [1, v, u]]);
+        }
+        let mut mesh = Mesh::from_triangles(&cone).unwrap();
+        let all: Vec<VertexId> = mesh.vertices().collect();
+        let mut resolver = Resolver::with_max_vertices(2000);
+        let pauses = Pauses::default();
+        finished(resolver.resolve_in_slices(&mut mesh, Sampling::new(0.2), &all, &Unguided, &pauses));
+        assert_eq!(mesh.check(), Ok(()));
+        assert!(resolver.is_embedded(&mesh));
+        assert!(pauses.work() > 20 * u64::from(RIM), "{}", pauses.work());
     }
 }

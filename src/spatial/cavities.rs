@@ -1,8 +1,10 @@
 //! Components of a surface that are enclosed by others, such as the walls of cavities.
 
-use super::contains;
-use crate::math::{Bounds, BoxTree};
+use super::TriangleTree;
+use super::contains::winding_number;
+use crate::math::{Bounds, BoxTree, Vec3};
 use crate::mesh::{MeshError, TriangleMesh, measure};
+use crate::pauses::{Pauses, finished};
 
 /// Returns the indices of the connected components that no larger one encloses, as numbered by
 /// [`TriangleMesh::components`]: those that are left when all cavities are filled. A solid inside a cavity is enclosed,
@@ -11,39 +13,72 @@ use crate::mesh::{MeshError, TriangleMesh, measure};
 /// # Errors
 /// As [`TriangleMesh::check_closed`].
 pub fn outer_components(mesh: &TriangleMesh) -> Result<Vec<u32>, MeshError> {
+    finished(outer_components_in_slices(mesh, &Pauses::default()))
+}
+
+/// Does what [`outer_components`] does, and pauses meanwhile.
+///
+/// # Errors
+/// As [`outer_components`].
+pub async fn outer_components_in_slices(mesh: &TriangleMesh, pauses: &Pauses) -> Result<Vec<u32>, MeshError> {
     mesh.check_closed()?;
-    let components = mesh.components();
-    let bounds: Vec<Bounds> = components.iter().map(|part| Bounds::from_points(&part.positions)).collect();
-    let volumes: Vec<f64> = components.iter().map(|part| measure(part).volume.abs()).collect();
-    let tree = BoxTree::new(&bounds);
-    let mut is_enclosed = vec![false; components.len()];
-    for (j, outer) in components.iter().enumerate() {
-        let is_candidate = |i: usize| {
-            i != j && !is_enclosed[i] && volumes[i] < volumes[j] && bounds[j].contains_box(&bounds[i])
-        };
-        let mut candidates = Vec::new();
-        tree.for_each_overlapping(&bounds[j], |i| {
-            if is_candidate(i as usize) {
-                candidates.push(i as usize);
-            }
+    pauses.now().await;
+    let (mut components, mut sizes) = (Vec::new(), Vec::new());
+    for surface in mesh.components() {
+        sizes.push(Size {
+            bounds: Bounds::from_points(&surface.positions),
+            volume: measure(&surface).volume.abs(),
         });
-        if candidates.is_empty() {
-            continue;
-        }
-        let points: Vec<_> = candidates.iter().map(|&i| components[i].positions[0].as_dvec3()).collect();
-        for (i, is_inside) in candidates.into_iter().zip(contains(outer, points)?) {
-            is_enclosed[i] |= is_inside;
-        }
+        let tree = TriangleTree::in_slices(&surface, pauses).await?;
+        components.push((surface, tree));
+        pauses.after(1).await;
     }
-    Ok((0..).zip(is_enclosed).filter(|(_, is_enclosed)| !is_enclosed).map(|(i, _)| i).collect())
+    let bounds: Vec<Bounds> = sizes.iter().map(|size| size.bounds).collect();
+    let boxes = BoxTree::new(&bounds);
+    let mut outer = Vec::new();
+    for (i, (size, (surface, _))) in sizes.iter().zip(&components).enumerate() {
+        let p = surface.positions[0];
+        let (mut is_enclosed, mut tests) = (false, 0);
+        boxes.within(p, 0.0, |other| {
+            tests += 1;
+            let other = other as usize;
+            is_enclosed = size.fits_into(&sizes[other]) && is_inside(p, &components[other]);
+            is_enclosed
+        });
+        if !is_enclosed {
+            outer.push(i as u32);
+        }
+        pauses.after(1 + tests / TESTS_PER_UNIT).await;
+    }
+    Ok(outer)
+}
+
+/// Number of components that are tested for whether they enclose another in a unit of work.
+const TESTS_PER_UNIT: usize = 16;
+
+/// What tells at once that most components do not enclose another.
+struct Size {
+    bounds: Bounds,
+    volume: f64,
+}
+
+impl Size {
+    fn fits_into(&self, other: &Self) -> bool {
+        self.volume < other.volume && other.bounds.contains_box(&self.bounds)
+    }
+}
+
+fn is_inside(p: Vec3, (surface, tree): &(TriangleMesh, TriangleTree)) -> bool {
+    winding_number(surface, tree, p.as_dvec3()).0 != 0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Vec3;
+    use crate::math::Random;
     use crate::mesh::Mesh;
-    use crate::mesh::shapes::{joined, torus};
+    use crate::mesh::shapes::{cuboid, joined, torus};
+    use crate::spatial::contains;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -75,6 +110,35 @@ mod tests {
         assert_eq!((filled.triangles, filled.components), (expected.triangles, 3));
         assert!((filled.volume - expected.volume).abs() < 1e-9);
         assert!(mesh.with_components(&[6]).is_err());
+    }
+
+    #[test]
+    fn parts_that_cross_are_enclosed_if_a_larger_one_has_their_first_vertex_and_their_box() {
+        let mut outer = 0;
+        for seed in 0..20 {
+            let mut random = Random::new(seed);
+            let mut number = || random.unit() as f32;
+            let parts: Vec<TriangleMesh> = (0..40)
+                .map(|_| {
+                    let at = Vec3::new(number(), number(), number());
+                    let size = 0.05 + number() * number();
+                    let mut part = cuboid(Vec3::new(size, size * (0.5 + number()), size));
+                    part.positions.iter_mut().for_each(|p| *p += at);
+                    part
+                })
+                .collect();
+            let encloses = |other: &TriangleMesh, part: &TriangleMesh| {
+                let [large, small] = [other, part].map(|mesh| Bounds::from_points(&mesh.positions));
+                measure(part).volume < measure(other).volume
+                    && large.contains_box(&small)
+                    && contains(other, [part.positions[0].as_dvec3()]).unwrap()[0]
+            };
+            let is_outer = |&i: &u32| !parts.iter().any(|other| encloses(other, &parts[i as usize]));
+            let expected: Vec<u32> = (0..40).filter(is_outer).collect();
+            assert_eq!(outer_components(&joined(&parts)), Ok(expected.clone()), "seed {seed}");
+            outer += expected.len();
+        }
+        assert!((100..700).contains(&outer), "{outer}");
     }
 
     #[test]

@@ -50,9 +50,9 @@ pub async fn contains_in_slices(
 /// Number of triangles along a line that are a unit of work.
 const TRIANGLES_PER_UNIT: usize = 64;
 
-/// Returns the winding number of a point, from the triangles between it and infinity at low x, and the number of those whose
-/// boxes are there.
-fn winding_number(mesh: &TriangleMesh, tree: &TriangleTree, p: DVec3) -> (i32, usize) {
+/// Returns the winding number of a finite point, from the triangles between it and infinity at low x, and the number of
+/// those whose boxes are there. `tree` is that of the mesh, which is closed.
+pub(super) fn winding_number(mesh: &TriangleMesh, tree: &TriangleTree, p: DVec3) -> (i32, usize) {
     // Rounding is monotonic, so a line that meets a box of single precision still does when it is rounded.
     let end = p.as_vec3();
     let line = Bounds { min: Vec3::new(f32::NEG_INFINITY, end.y, end.z), max: end };

@@ -15,7 +15,7 @@ mod sweep;
 mod tree;
 mod vertex_grid;
 
-pub use cavities::outer_components;
+pub use cavities::{outer_components, outer_components_in_slices};
 pub use cells::CellSet;
 pub use contains::{contains, contains_in_slices};
 pub use distance::{SurfaceDistance, surface_distance, surface_distance_in_slices};

@@ -29,6 +29,7 @@ const OPERATIONS: Record<keyof MeshInSlices, (mesh: Mesh | MeshInSlices) => unkn
   decimateWithin: (mesh) => mesh.decimateWithin(0.01, { targetTriangles: 500 }),
   smooth: (mesh) => mesh.smooth({ iterations: 3 }),
   cut: (mesh) => mesh.cut({ origin: [0.1, 0, 0], normal: [1, 2, 3] }),
+  removeCavities: (mesh) => mesh.removeCavities(),
   contains: (mesh) => mesh.contains(Float32Array.from({ length: 9000 }, (_, k) => (k * 0.618) % 1.5)),
   toVolume: async (mesh) => (await mesh.toVolume(GRID, { kind: 'distance' })).intensities(),
   check: (mesh) => mesh.check(),

@@ -184,19 +184,21 @@ describe('small files of large images', () => {
   });
 
   test('a JPEG of very many scans', async () => {
-    const refused = (scans: number, side: number) => {
+    const refused = (scans: number, side: number, empty = 60_000) => {
       const [high, low] = [side >> 8, side & 255];
       const start = [0xff, 0xd8, 0xff, 0xc2, 0, 11, 8, high, low, high, low, 1, 1, 0x11, 0];
       const scan = [0xff, 0xda, 0, 8, 1, 1, 0, 0, 0, 0];
       const scanned = Array.from({ length: scans }, () => scan).flat();
-      const bytes = [...start, ...scanned, ...zeros(60_000)];
+      const bytes = [...start, ...scanned, ...zeros(empty)];
       const one = page({ 256: side, 257: side, 259: 7, 279: bytes.length });
       return within(1, () => refusal(file([Uint8Array.from(bytes), padding], one)));
     };
     expect(await refused(5000, 768)).toMatch(/more than 20 scans/);
     // Fewer of a larger image.
-    expect(await refused(20, 4000)).toMatch(/or 134 million pixels in all of them, is not decoded/);
+    expect(await refused(20, 4000)).toMatch(/or 134 million pixels in all of them and 1000 for each byte, is not decoded/);
     expect(await refused(8, 4000)).not.toMatch(/not decoded/);
+    // As it is in many bytes.
+    expect(await refused(20, 4000, 400_000)).not.toMatch(/not decoded/);
   });
 });
 

@@ -16,12 +16,18 @@ const SHORTEST: f32 = 1e-30;
 /// The largest valence of a vertex whose triangles are compared in pairs: with thousands, that takes a second.
 const MOST_IN_FAN: usize = 512;
 
+/// The largest number of pairs of triangles at two vertices that are compared.
+const MOST_PAIRS: usize = MOST_IN_FAN * MOST_IN_FAN;
+
 type Triangle = [Vec3; 3];
 
 /// Returns the clearance between the triangles at `u` and those at `v` without a common corner: how far all vertices
 /// may move before two of them can intersect; not positive if some pair is not known to be disjoint. Of clearances
 /// above `enough`, any may be returned. `longest` is the longest edge at `u` and `v`.
 pub(super) fn triangle_clearance(mesh: &Mesh, [u, v]: [VertexId; 2], longest: f32, enough: f32) -> f32 {
+    if mesh.ring(u).valence() * mesh.ring(v).valence() > MOST_PAIRS {
+        return 0.0;
+    }
     // Lengths are relative to the longest edge, so that squares of products of edges neither over- nor underflow.
     let (origin, per_length) = (mesh.position(u), 1.0 / longest);
     let at = |w: VertexId| (mesh.position(w) - origin) * per_length;

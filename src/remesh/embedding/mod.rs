@@ -112,6 +112,8 @@ pub struct Embedding {
     /// displacement: then shortening displacements may not have resolved the intersection.
     stuck: bool,
     effort: u64,
+    /// Number of triangles around vertices that were tested after edits, the work besides [`Self::effort`].
+    tested_around: u64,
     /// The output space (world space in single precision), in which triangles must not intersect either, if it is
     /// watched.
     output: Option<OutputSpace>,
@@ -268,6 +270,12 @@ impl Embedding {
     /// [`Resolver`](super::Resolver) limits a call.
     pub fn effort(&self) -> u64 {
         self.effort
+    }
+
+    /// Returns the number of triangles around vertices that were tested after edits so far: thousands for each edit beside
+    /// a hub of as many.
+    pub(super) fn tested_around(&self) -> u64 {
+        self.tested_around
     }
 
     /// Appends the components of another mesh; returns the new vertices, and the corners of all triangles that

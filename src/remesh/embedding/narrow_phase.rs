@@ -329,7 +329,12 @@ fn keep_few(intersecting: &mut Vec<VertexId>, mesh: &Mesh) {
 
 /// Returns the ends of an edge across which `v` and `w` are opposite each other, `None` if there is none.
 fn common_edge(mesh: &Mesh, v: VertexId, w: VertexId) -> Option<[VertexId; 2]> {
-    mesh.ring(v).pairs().find(|&(a, b)| mesh.ring(a).before(b) == Some(w)).map(|(a, b)| [a, b])
+    let opposite = |(a, b): (VertexId, VertexId)| {
+        // Of the two rings that tell, the shorter one: the other may have thousands.
+        let (of_a, of_b) = (mesh.ring(a), mesh.ring(b));
+        if of_a.valence() <= of_b.valence() { of_a.before(b) } else { of_b.after(a) }
+    };
+    mesh.ring(v).pairs().find(|&pair| opposite(pair) == Some(w)).map(|(a, b)| [a, b])
 }
 
 #[cfg(test)]

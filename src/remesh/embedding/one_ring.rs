@@ -251,17 +251,18 @@ pub(super) fn changes_intersect_around(
 ) -> bool {
     let is_changed =
         |facet: &Facet| changed.iter().any(|corners| corners.iter().all(|w| facet.corners.contains(&w.0)));
-    let facets: SmallVec<[(Facet, bool); ORDINARY_RING]> =
-        facets_at(mesh, v).map(|facet| (facet, is_changed(&facet))).collect();
+    let facets: SmallVec<[Facet; ORDINARY_RING]> = facets_at(mesh, v).collect();
+    let edited: SmallVec<[bool; ORDINARY_RING]> = facets.iter().map(is_changed).collect();
     let margin = 2.0 * (exact_below(output) + ROUNDING * longest);
     let last = facets.len() - 1;
-    facets.iter().enumerate().any(|(k, (s, s_changed))| {
-        facets[..k].iter().enumerate().any(|(j, (t, t_changed))| {
-            let share_an_edge = j + 1 == k || (j == 0 && k == last);
-            (*s_changed || *t_changed)
-                && (share_an_edge || !are_apart_at_corner(mesh.position(v), s, t, margin))
-                && intersect(s, t, output)
-        })
+    let intersects = |j: usize, k: usize| {
+        let (s, t) = (&facets[j], &facets[k]);
+        let share_an_edge = j + 1 == k || (j == 0 && k == last);
+        (share_an_edge || !are_apart_at_corner(mesh.position(v), t, s, margin)) && intersect(t, s, output)
+    };
+    // Around a hub with thousands of triangles, an edit changes a few.
+    (0..=last).filter(|&k| edited[k]).any(|k| {
+        (0..k).any(|j| intersects(j, k)) || (k + 1..=last).any(|other| !edited[other] && intersects(k, other))
     })
 }
 

@@ -43,10 +43,11 @@ impl Embedding {
 
     /// Returns whether one of the triangles `changed` by an edit, given by their corners, intersects another one with
     /// which it has a common corner.
-    fn any_one_ring_intersects(&self, mesh: &Mesh, changed: &[[VertexId; 3]]) -> bool {
+    fn any_one_ring_intersects(&mut self, mesh: &Mesh, changed: &[[VertexId; 3]]) -> bool {
         let mut hubs: Vec<VertexId> = changed.iter().flatten().copied().collect();
         sort_distinct(&mut hubs);
         hubs.into_iter().any(|hub| {
+            self.tested_around += mesh.ring(hub).valence() as u64;
             let longest = longest_edge(mesh, hub);
             flat_clearance(mesh, hub, longest) <= self.exact_below()
                 && changes_intersect_around(mesh, hub, longest, changed, self.output.as_ref())
