@@ -1,4 +1,6 @@
 // Entry points of the package other than `vesicle`, in Node.
+import { readFile } from 'node:fs/promises';
+import ts from 'typescript';
 import { beforeAll, describe, expect, test } from 'vitest';
 import * as deformable from '../../pkg/deformable/index.js';
 import * as implicit from '../../pkg/implicit/index.js';
@@ -6,29 +8,21 @@ import * as files from '../../pkg/import/index.js';
 import * as vesicle from '../../pkg/index.js';
 import * as multires from '../../pkg/multires/index.js';
 import * as tracking from '../../pkg/tracking/index.js';
+import { LACKING } from '../../scripts/entries.mjs';
 import { beats, REACH, SECONDS } from './beating.js';
 import { BUMPS_BITS, bumpsBits } from './bumps.js';
 import { LAMP_BITS, lampBits } from './lamp.js';
 import { bits, node, root } from './processes.js';
 import { SPONGE_BITS, spongeBits } from './sponge.js';
 
-/** Members of volumes that only the whole library has. */
-const LABEL_MAPS = ['crop', 'dice', 'frame', 'label', 'labels', 'resample', 'threshold', 'toBytes', 'write'];
+/** What the documentation of a member says that entry points with one method lack. */
+const LACKS = /Entry points with one method lack it(?:, but for `vesicle\/(\w+)`)?/;
 
-/** Members of meshes that only the whole library has. */
-const VOXELISATION = [
-  ...[
-    'contains',
-    'cut',
-    'decimateWithin',
-    'inSlices',
-    'keepComponents',
-    'removeCavities',
-    'smooth',
-    'toVolume',
-    'transform',
-  ],
-];
+/** Returns the members of a class that the entry point with this method lacks. */
+const lacking = (name: keyof typeof LACKING, method: string) =>
+  Object.entries<string[]>(LACKING[name])
+    .flatMap(([member, having]) => (having.includes(method) ? [] : [member]))
+    .sort();
 
 type VolumeInit = ConstructorParameters<typeof vesicle.Volume>[0];
 
@@ -90,23 +84,40 @@ describe('an entry point with one method', () => {
 
   test('has no readers of files, nor, but for tracking, interpolation of slices and volumes of frames', () => {
     const { Mesh, Volume } = vesicle;
+    const classes = { Mesh, Volume };
     expect('parse' in Mesh && 'parse' in Volume && 'enrichSlices' in Volume.prototype).toBe(true);
     for (const method of METHODS) {
       const own = entries[method];
       expect('parse' in own.Mesh || 'parse' in own.Volume).toBe(false);
       expect('enrichSlices' in own.Volume.prototype).toBe(method === 'tracking');
       expect('fromFrames' in own.Volume).toBe(method === 'tracking');
-      const missing = (whole: object, part: object) =>
-        Object.getOwnPropertyNames(whole).filter((name) => !(name in part) && name !== 'enrichSlices');
-      const also = method === 'tracking' ? [] : ['inSlices'];
-      expect(missing(Volume.prototype, own.Volume.prototype).sort()).toEqual([...LABEL_MAPS, ...also].sort());
-      expect(missing(Mesh.prototype, own.Mesh.prototype).sort()).toEqual(VOXELISATION);
+      const missing = (all: object, some: object) => Object.getOwnPropertyNames(all).filter((name) => !(name in some));
+      for (const [name, whole] of Object.entries(classes) as ['Mesh' | 'Volume', typeof Mesh | typeof Volume][]) {
+        const parts = [missing(whole, own[name]), missing(whole.prototype, own[name].prototype)];
+        expect(parts.flat().sort()).toEqual(lacking(name, method));
+      }
     }
     // @ts-expect-error: the types have no readers either.
     expect(() => deformable.Volume.parse(new Uint8Array(8))).toThrow(TypeError);
     const image = { data: Float32Array.from({ length: 64 }, (_, i) => i), dims: [4, 4, 4] } as const;
     const slices = new tracking.Volume({ ...image, dims: [...image.dims] }).enrichSlices({ factor: 2 });
     expect(slices.dims).toEqual([4, 4, 7]);
+  });
+
+  test('lacks what the documentation says', async () => {
+    const said: Record<string, Record<string, string[]>> = {};
+    for (const file of ['mesh', 'volume', 'deformable']) {
+      const text = await readFile(`${root}pkg/${file}.d.ts`, 'utf8');
+      const { statements } = ts.createSourceFile(file, text, ts.ScriptTarget.Latest);
+      for (const { name, members } of statements.filter(ts.isClassDeclaration)) {
+        const found = members.flatMap(({ name: member, pos, end }): [string, string[]][] => {
+          const [lacks, having] = LACKS.exec(text.slice(pos, end)) ?? [];
+          return lacks && member && ts.isIdentifier(member) ? [[member.text, having ? [having] : []]] : [];
+        });
+        if (found.length > 0) said[name?.text ?? ''] = Object.fromEntries(found);
+      }
+    }
+    expect(said).toEqual(LACKING);
   });
 
   test('throws the errors of vesicle, and takes no object of another module', () => {

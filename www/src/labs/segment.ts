@@ -394,6 +394,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
 
   protected describe(): string {
     const present = [...this.#measures.values()].filter(({ voxels }) => voxels > 0);
+    if (present.length === 0) return text('segment.nothingLabelled');
     const labels = plural('segment.surfaces', present.length);
     const { smooth } = this.#latency;
     if (smooth === undefined) return text('segment.ready', { labels });
