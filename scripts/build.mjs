@@ -168,6 +168,7 @@ async function assemble(modules) {
   await makeInline();
   await makeElement();
   await writeNotices('pkg/licences.txt', 'element');
+  await copyFile(at('scripts/prepack.mjs'), at('pkg/prepack.mjs'));
   for (const file of PAPERS) await cp(at(file), at('pkg', file), { recursive: true });
   await writeFile(at('pkg/package.json'), `${JSON.stringify(await manifest(modules), null, 2)}\n`);
 }
@@ -194,6 +195,7 @@ async function manifest(modules) {
     license,
     keywords: ['mesh', 'surface', 'volume', 'isosurface', 'medical imaging', 'deformable model', 'wasm'],
     type: 'module',
+    scripts: { prepack: 'node prepack.mjs' },
     sideEffects: ['./worker-host.js', './element.js'],
     engines,
     // For `FORMATS` only.

@@ -15,7 +15,7 @@ import { LAMP_BITS, lampBits } from './lamp.js';
 import { bits, node, root } from './processes.js';
 import { SPONGE_BITS, spongeBits } from './sponge.js';
 
-/** What the documentation of a member says that entry points with one method lack. */
+/** The sentence in the documentation of a member that entry points with one method lack. */
 const LACKS = /Entry points with one method lack it(?:, but for `vesicle\/(\w+)`)?/;
 
 /** Returns the members of a class that the entry point with this method lacks. */
