@@ -49,7 +49,7 @@ const glueName = ({ glue = 'vesicle' }) => glue;
 const made = (module) => join(folder(module), `${glueName(module)}_bg.wasm`);
 
 // Documents that the README links to.
-const PAPERS = ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md', 'CHANGELOG.md', 'docs'];
+const PAPERS = ['SECURITY.md', 'LICENSE-MIT', 'LICENSE-APACHE', 'README.md', 'ARCHITECTURE.md', 'CHANGELOG.md', 'docs'];
 
 // Adapters to third-party software: `vesicle/three` and so on.
 const ADAPTERS = ['three', 'niivue', 'vtk', 'cornerstone'];

@@ -33,7 +33,9 @@ impl Failure {
     pub fn too_large(bytes: u64) -> Self {
         Self::new(
             "too-large",
-            format!("{bytes} bytes are needed, more than is left of the 4 GiB of WebAssembly"),
+            format!(
+                "{bytes} bytes are needed, more than is left of the 4 GiB of WebAssembly: free() what is no longer needed"
+            ),
         )
     }
 }

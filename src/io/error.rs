@@ -41,7 +41,7 @@ pub enum FormatError {
     },
     /// The content does not fit in memory, or exceeds a limit of the reader.
     #[error(
-        "{format}: {field}: needs {needed} bytes, more than a reader may take, or is left of the 4 GiB of WebAssembly"
+        "{format}: {field}: needs {needed} bytes, more than a reader may take, or is left of the 4 GiB of WebAssembly (free() what is no longer needed)"
     )]
     TooLarge {
         /// Name of the file format.

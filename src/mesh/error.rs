@@ -62,7 +62,9 @@ pub enum MeshError {
         pairs: usize,
     },
     /// A file of the mesh needs more memory than is left, or would exceed 4 GiB.
-    #[error("the mesh needs {bytes} bytes, more than is left of the 4 GiB of WebAssembly")]
+    #[error(
+        "the mesh needs {bytes} bytes, more than is left of the 4 GiB of WebAssembly: free() what is no longer needed"
+    )]
     TooLarge {
         /// The memory required, in bytes.
         bytes: u64,

@@ -454,7 +454,7 @@ mod tests {
         assert!(mesh.vertex_count() <= 520);
     }
 
-    /// Regression: edits beside two hubs of 4,000 neighbours, each of which looked at all of these, took 3 s between pauses.
+    /// Regression: edits beside two hubs of 4,000 neighbours, each of which tested all of these, took 3 s between pauses.
     #[test]
     fn edits_beside_hubs_pause() {
         const RIM: u32 = 300;

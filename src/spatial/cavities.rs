@@ -56,7 +56,7 @@ pub async fn outer_components_in_slices(mesh: &TriangleMesh, pauses: &Pauses) ->
 /// Number of components that are tested for whether they enclose another in a unit of work.
 const TESTS_PER_UNIT: usize = 16;
 
-/// What tells at once that most components do not enclose another.
+/// Bounds and volume of a component, by which most are found not to enclose another.
 struct Size {
     bounds: Bounds,
     volume: f64,

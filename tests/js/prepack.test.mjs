@@ -1,4 +1,4 @@
-// What `npm pack` refuses.
+// Packages that `npm pack` refuses.
 import { spawnSync } from 'node:child_process';
 import { mkdir, mkdtemp, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
