@@ -36,7 +36,7 @@ export {
   type VoxelKind,
 } from './mesh.js';
 export type { ParamSpec } from './params.js';
-export { type InitInput, init as default, initSync } from './runtime.js';
+export { type InitInput, init as default, initSync, type ModuleOptions } from './runtime.js';
 export type { RunOptions, SliceOptions, Stepper, StepReport } from './stepper.js';
 export { Volume, type VolumeFormat, type VolumeInSlices } from './volume.js';
 export type { Warning, WarningCode } from './warning.js';

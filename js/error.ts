@@ -43,17 +43,20 @@ export type ErrorCode =
    */
   | 'aborted'
   /** Use of an object after its `free()`, or after it was lost in a crash or with its worker. */
-  | 'freed';
+  | 'freed'
+  /** A fault of the library itself; the error is a {@link VesicleCrash}. */
+  | 'crash';
 
 /**
- * An error the library can foresee. `message` says what was wrong and what is accepted, `code` is the kind of failure.
+ * An error of the library. But for a {@link VesicleCrash} it was foreseen: `message` says what was wrong and what is
+ * accepted, `code` is the kind of failure.
  */
 export class VesicleError extends Error {
   /** The kind of failure, by which programs can distinguish errors. */
   readonly code: ErrorCode;
 
-  constructor(code: ErrorCode, message: string) {
-    super(message);
+  constructor(code: ErrorCode, message: string, options?: ErrorOptions) {
+    super(message, options);
     this.name = 'VesicleError';
     this.code = code;
   }
@@ -78,9 +81,10 @@ export class NeedsDataError extends VesicleError {
  * A fault inside the library itself (a bug, or memory that ran out half-way). The WebAssembly instance and all objects
  * created with it are lost. `await init()` starts a new instance, with which new objects can be created.
  */
-export class VesicleCrash extends Error {
+export class VesicleCrash extends VesicleError {
   constructor(what: string, options?: ErrorOptions) {
     super(
+      'crash',
       `${what}. This is a fault in vesicle: every volume, mesh and model made so far is lost. ` +
         'Call init() to create new ones, and please report the error.',
       options,

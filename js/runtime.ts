@@ -9,6 +9,14 @@ import load, { initSync as loadSync, __wbg_reset_state as reset } from './vesicl
  */
 export type InitInput = RequestInfo | URL | Response | BufferSource | WebAssembly.Module;
 
+/** The module that {@link init} loads, by the name of the option and by its former one. */
+export interface ModuleOptions {
+  /** The compiled module, its bytes or its address. */
+  module?: InitInput | Promise<InitInput>;
+  /** @deprecated The former name of `module`. */
+  module_or_path?: InitInput | Promise<InitInput>;
+}
+
 let starting: Promise<unknown> | undefined;
 let instance: unknown;
 let crash: VesicleCrash | undefined;
@@ -19,13 +27,14 @@ let generation = 0;
  * Loads the WebAssembly module; required before anything else. Idempotent: later calls return the same promise. After a
  * {@link VesicleCrash} it starts a new instance.
  *
- * @param options - `module_or_path`: the module, its bytes or its address. By default, the `.wasm` beside this file is
- *   fetched (in a browser) or read (in Node); in `vesicle/inline` it is embedded in the file itself.
+ * @param options - `module`: the module, its bytes or its address. By default, the `.wasm` beside this file is fetched
+ *   (in a browser) or read (in Node); in `vesicle/inline` it is embedded in the file itself. `module_or_path` is its
+ *   former name, deprecated.
  * @throws Any error of fetching or compiling; a later call tries again.
  */
-export function init(options: { module_or_path?: InitInput | Promise<InitInput> } = {}): Promise<unknown> {
+export function init(options: ModuleOptions = {}): Promise<unknown> {
   if (crash) restart();
-  starting ??= begin(options.module_or_path).catch((error: unknown) => {
+  starting ??= begin(options.module ?? options.module_or_path).catch((error: unknown) => {
     starting = undefined;
     throw error;
   });

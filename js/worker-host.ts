@@ -219,15 +219,17 @@ function classOf(object: LibraryObject): ClassName {
 
 function start(module: Extract<Task, { type: 'init' }>['module']): Promise<void> {
   const source = typeof module === 'string' ? new URL(module) : module;
-  return init(source && { module_or_path: source }).then(() => undefined);
+  return init(source && { module: source }).then(() => undefined);
 }
 
 function failureOf(error: unknown): Failure {
   if (error === ABORTED) return { kind: 'aborted' };
+  if (error instanceof VesicleCrash) {
+    return { kind: 'crash', message: error.message, cause: error.cause ? asError(error.cause) : undefined };
+  }
   if (error instanceof VesicleError) return { kind: 'error', code: error.code, message: error.message };
   const other = asError(error);
-  if (!(other instanceof VesicleCrash)) return { kind: 'other', name: other.name, error: other };
-  return { kind: 'crash', message: other.message, cause: other.cause ? asError(other.cause) : undefined };
+  return { kind: 'other', name: other.name, error: other };
 }
 
 const asError = (error: unknown) => (error instanceof Error ? error : new Error(String(error)));

@@ -1,17 +1,12 @@
 // Starts and terminates the worker, for any origin of page and package.
 import { checkProperties } from './check.js';
 import { VesicleError } from './error.js';
-import type { InitInput } from './runtime.js';
+import type { InitInput, ModuleOptions } from './runtime.js';
 import type { Task } from './worker-protocol.js';
 import { type NodeWorker, Session } from './worker-session.js';
 
 /** Options of {@link init} of `vesicle/worker`. */
-export interface WorkerInit {
-  /**
-   * The compiled WebAssembly module, its bytes or its address, as in `vesicle`. By default the worker loads the `.wasm`
-   * beside itself.
-   */
-  module_or_path?: InitInput | Promise<InitInput>;
+export interface WorkerInit extends ModuleOptions {
   /**
    * A new worker that runs `vesicle/worker-host`, where this library cannot create one: for bundlers that do not
    * recognise `new Worker(new URL(…, import.meta.url), { type: 'module' })`. The library takes ownership, and each
@@ -71,8 +66,12 @@ async function startOnce(given: WorkerInit): Promise<void> {
 }
 
 async function start(given: WorkerInit, own: number): Promise<void> {
-  const { module_or_path, worker } = checkProperties('options', given, ['module_or_path', 'worker']);
-  const module = await sendable(await module_or_path);
+  const {
+    module: one,
+    module_or_path,
+    worker,
+  } = checkProperties('options', given, ['module', 'module_or_path', 'worker']);
+  const module = await sendable(await (one ?? module_or_path));
   const started = new Session(worker ?? (globalThis.Worker ? browserWorker() : await nodeWorker()));
   if (own === startCount) session = started;
   else started.end(terminated());

@@ -77,6 +77,7 @@ export type {
   MeshInfo,
   MeshReport,
   MeshTexture,
+  ModuleOptions,
   MultiresParams,
   NamedFile,
   ParamSpec,

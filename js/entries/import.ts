@@ -43,7 +43,7 @@ export type {
   VoxelArray,
 } from '../data.js';
 export { type ErrorCode, VesicleCrash, VesicleError } from '../error.js';
-export { type InitInput, init as default, initSync } from '../runtime.js';
+export { type InitInput, init as default, initSync, type ModuleOptions } from '../runtime.js';
 export type { Warning, WarningCode } from '../warning.js';
 
 /**

@@ -100,7 +100,7 @@ test.each(ENTRIES)('webpack, %s', async (entry) => {
 });
 
 test('esbuild, with the address of the module', async () => {
-  await write('main.js', main('vesicle', `{ module_or_path: new URL('./vesicle_bg.wasm', import.meta.url) }`));
+  await write('main.js', main('vesicle', `{ module: new URL('./vesicle_bg.wasm', import.meta.url) }`));
   const { build } = await import('esbuild');
   const outdir = join(project, 'dist/esbuild');
   const built = await build({

@@ -72,7 +72,7 @@ test('two hundred steps give the same bits as the native core, and the page stay
 
 test('a run is aborted from the page, and buffers are transferred', async () => {
   const content = `${LIBRARY}
-    await init({ module_or_path: 'vesicle_bg.wasm' });
+    await init({ module: 'vesicle_bg.wasm' });
     const data = Uint8Array.from({ length: 8000 }, (_, i) => (i % 20 > 5 && i % 20 < 15 ? 100 : 0));
     const volume = new Volume(library.transfer({ data, dims: [20, 20, 20] }));
     const params = { iso: 50, isoForce: -1, energyTolerance: 1e-12, maxMove: 0.01, timeStep: 0.01 };

@@ -6,7 +6,11 @@
 // ── start ───────────────────────────────────────────────────────────────────────────────────────
 export type InitInput = RequestInfo | URL | Response | BufferSource | WebAssembly.Module;
 /** Idempotent. With no argument, fetches the .wasm beside the module (browser) or reads it (Node). */
-export default function init(options?: { module_or_path?: InitInput | Promise<InitInput> }): Promise<unknown>;
+export default function init(options?: {
+  module?: InitInput | Promise<InitInput>;
+  /** Deprecated. */
+  module_or_path?: InitInput | Promise<InitInput>;
+}): Promise<unknown>;
 export function initSync(options: { module: BufferSource | WebAssembly.Module }): unknown;
 export function version(): string;
 
@@ -24,7 +28,8 @@ export class VesicleError extends Error {
     | 'no-progress' // work that stopped, since a round changed nothing for the better
     | 'too-large' // needs more memory than wasm32 has; says how much
     | 'aborted'
-    | 'freed'; // use after free()
+    | 'freed' // use after free()
+    | 'crash'; // a fault of the library itself
 }
 
 export type Vec3 = [number, number, number];

@@ -28,10 +28,12 @@ test('init is idempotent, and also takes bytes, a module, a response and an addr
     `Promise.resolve(new URL('./pkg/vesicle_bg.wasm', 'file://' + process.cwd() + '/'))`,
   ];
   for (const source of sources) {
+    // Also by the former name.
+    const option = source === sources[0] ? 'module_or_path' : 'module';
     const script = `
       import { readFileSync } from 'node:fs';
       import init, { version } from './pkg/index.js';
-      const first = await init({ module_or_path: ${source} });
+      const first = await init({ ${option}: ${source} });
       console.log((await init()) === first, version().length > 0);`;
     expect(node(script), source).toBe('true true');
   }
@@ -49,7 +51,7 @@ test('initSync starts synchronously', () => {
 test('a failed start can be tried again', () => {
   const script = `
     import init, { version } from './pkg/index.js';
-    const failed = await init({ module_or_path: new Uint8Array(8) }).catch((error) => error.name);
+    const failed = await init({ module: new Uint8Array(8) }).catch((error) => error.name);
     await init();
     console.log(failed, version().length > 0);`;
   expect(node(script)).toBe('CompileError true');
@@ -84,7 +86,7 @@ const CRASH = `
   console.log(JSON.stringify(seen));`;
 
 test('after a crash every call reports it, until init starts a new instance', () => {
-  const crash = 'VesicleCrash undefined';
+  const crash = 'VesicleCrash crash';
   expect(JSON.parse(node(CRASH))).toEqual([crash, crash, crash, 'VesicleError freed', null, 0]);
 });
 

@@ -195,7 +195,9 @@ describe('small files of large images', () => {
     };
     expect(await refused(5000, 768)).toMatch(/more than 20 scans/);
     // Fewer of a larger image.
-    expect(await refused(20, 4000)).toMatch(/or 134 million pixels in all of them and 1000 for each byte, is not decoded/);
+    expect(await refused(20, 4000)).toMatch(
+      /or 134 million pixels in all of them and 1000 for each byte, is not decoded/,
+    );
     expect(await refused(8, 4000)).not.toMatch(/not decoded/);
     // As it is in many bytes.
     expect(await refused(20, 4000, 400_000)).not.toMatch(/not decoded/);

@@ -594,8 +594,8 @@ test('terminate rejects pending calls, and init starts again', async () => {
 
 test('a failed start gives the reason, and the next one works', async () => {
   worker.terminate();
-  await expect(init({ module_or_path: new Uint8Array(8) })).rejects.toMatchObject({ name: 'CompileError' });
-  await expect(init({ module_or_path: new Response('', { status: 404 }) })).rejects.toThrow('404');
+  await expect(init({ module: new Uint8Array(8) })).rejects.toMatchObject({ name: 'CompileError' });
+  await expect(init({ module: new Response('', { status: 404 }) })).rejects.toThrow('404');
   const missing = new NodeWorker(new URL('nowhere.js', pkg));
   await expect(init({ worker: missing })).rejects.toThrow(/could not be started: .*nowhere\.js/);
   await expect(init(wrong({ wasm: 1 }))).rejects.toThrow('wasm');

@@ -19,6 +19,7 @@ export class Refusal extends Error {
  * 'internal'.
  */
 export function toFailure(error: unknown): Failure {
-  if (error instanceof VesicleError || error instanceof Refusal) return { code: error.code, message: error.message };
+  const isKnown = error instanceof VesicleError || error instanceof Refusal;
+  if (isKnown && error.code !== 'crash') return { code: error.code, message: error.message };
   return { code: 'internal', message: error instanceof Error ? error.message : String(error) };
 }
