@@ -1,5 +1,5 @@
 import { checkProperties, denseCopy, invalid, number } from './check.js';
-import type { SpaceOptions } from './data.js';
+import type { Bytes, SpaceOptions } from './data.js';
 import { type Mesh, meshHandle } from './mesh.js';
 import { checkedSpaceOptions, frameOf, SPACE_OPTIONS } from './mesh-file.js';
 import { call } from './runtime.js';
@@ -23,10 +23,7 @@ import { mergedWarnings, notesOf } from './warnings.js';
  *   range; `too-large`: more than there is memory for, or than a glb can hold, 4 GiB; `freed`: a mesh that was
  *   freed.
  */
-export function animationGlb(
-  frames: readonly Mesh[],
-  options: SpaceOptions & { frameSeconds?: number } = {},
-): Uint8Array {
+export function animationGlb(frames: readonly Mesh[], options: SpaceOptions & { frameSeconds?: number } = {}): Bytes {
   const { frameSeconds = 0.1, ...given } = checkProperties('options', options, ['frameSeconds', ...SPACE_OPTIONS]);
   number('frameSeconds', frameSeconds, { min: 0.001, max: 1000 });
   const meshes = denseCopy('frames', frames);
@@ -41,5 +38,5 @@ export function animationGlb(
     call(() => animation.free());
     throw error;
   }
-  return call(() => animation.finish(frameSeconds));
+  return call(() => animation.finish(frameSeconds) as Bytes);
 }

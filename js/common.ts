@@ -3,6 +3,7 @@ import { call } from './runtime.js';
 import { version as rawVersion } from './vesicle.js';
 
 export type {
+  Bytes,
   DataOptions,
   DataReport,
   LargeVolume,

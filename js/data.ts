@@ -10,6 +10,9 @@ export type Vec3 = [number, number, number];
  */
 export type PointArray = Float32Array | Float64Array;
 
+/** Bytes of a file or a saved state in memory of their own, as `Blob` and `postMessage` take them. */
+export type Bytes = Uint8Array<ArrayBuffer>;
+
 /** The typed arrays in which voxels can be given; a {@link Volume} stores them in the same type. */
 export type VoxelArray =
   | Uint8Array

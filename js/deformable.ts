@@ -11,7 +11,7 @@ import {
   vec3,
 } from './check.js';
 import { type Coverage, type CoverageOptions, checkedCoverage } from './coverage.js';
-import type { DataOptions, LargeVolume, PointArray, Vec3, VoxelArray } from './data.js';
+import type { Bytes, DataOptions, LargeVolume, PointArray, Vec3, VoxelArray } from './data.js';
 import { NeedsDataError } from './error.js';
 import { Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { frameOf } from './mesh-file.js';
@@ -502,8 +502,8 @@ export class DeformableModel implements Stepper {
    * Saves the whole state, for {@link DeformableModel.restore} of a model made with the same volume, frame and number
    * of levels. Of a {@link LargeVolume}, what has been read is not saved: the next step asks for it again.
    */
-  save(): Uint8Array {
-    return this.#use((raw) => raw.save());
+  save(): Bytes {
+    return this.#use((raw) => raw.save() as Bytes);
   }
 
   /**

@@ -1,5 +1,5 @@
 import { checkProperties, denseCopy, finite, integer, numbers, pointArray, shallowCopy, typedArray } from './check.js';
-import type { PointArray, Vec3 } from './data.js';
+import type { Bytes, PointArray, Vec3 } from './data.js';
 import { type Mesh, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
@@ -420,8 +420,8 @@ export class ImplicitSurface implements Stepper {
   }
 
   /** Saves the whole state, for {@link ImplicitSurface.restore} of a surface made with the same points and options. */
-  save(): Uint8Array {
-    return this.#handle.use((raw) => raw.save());
+  save(): Bytes {
+    return this.#handle.use((raw) => raw.save() as Bytes);
   }
 
   /**

@@ -1,5 +1,5 @@
 import { checkProperties, denseCopy, integer, number, shallowCopy, typedArray } from './check.js';
-import type { Vec3 } from './data.js';
+import type { Bytes, Vec3 } from './data.js';
 import { type Mesh, wrapMesh } from './mesh.js';
 import { frameOf, type MeshFrame } from './mesh-file.js';
 import { Handle } from './runtime.js';
@@ -213,8 +213,8 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
   }
 
   /** Saves the whole state but the label map, for {@link LabelSurfaces.restore} with the same label map and labels. */
-  save(): Uint8Array {
-    return this.#handle.use((raw) => raw.save());
+  save(): Bytes {
+    return this.#handle.use((raw) => raw.save() as Bytes);
   }
 
   /**

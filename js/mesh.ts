@@ -15,6 +15,7 @@ import {
   vec3,
 } from './check.js';
 import type {
+  Bytes,
   LengthUnit,
   MeshExtra,
   MeshFileOptions,
@@ -819,7 +820,7 @@ export class Mesh {
   toBytes(
     format: MeshFormat,
     options: SpaceOptions & { recentre?: boolean; warnings?: readonly Warning[] } = {},
-  ): Uint8Array {
+  ): Bytes {
     choice('format', format, FORMATS);
     const known = ['recentre', 'warnings', ...SPACE_OPTIONS];
     const { recentre = false, warnings, ...given } = checkProperties('options', options, known);
@@ -827,7 +828,7 @@ export class Mesh {
     const frame = checkedSpaceOptions(given, this.#frame, format === 'glb');
     const moved = recentre ? recentred(this.origin) : [];
     const notes = notesOf(mergedWarnings(moved, this.#warnings(), checkedWarnings('warnings', warnings)));
-    return this.#handle.use((raw) => raw.toBytes(format, recentre, notes, ...frame));
+    return this.#handle.use((raw) => raw.toBytes(format, recentre, notes, ...frame) as Bytes);
   }
 
   /**

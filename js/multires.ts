@@ -1,5 +1,5 @@
 import { checkProperties, choice, denseCopy, integer, invalid, shallowCopy, typedArray, vec3 } from './check.js';
-import type { Vec3 } from './data.js';
+import type { Bytes, Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { frameOf, type MeshFrame } from './mesh-file.js';
 import { Handle } from './runtime.js';
@@ -318,8 +318,8 @@ export class MultiresolutionModel implements Stepper {
    * Saves the whole state, for {@link MultiresolutionModel.restore} of a model made of the same meshes and initial
    * ellipsoids.
    */
-  save(): Uint8Array {
-    return this.#handle.use((raw) => raw.save());
+  save(): Bytes {
+    return this.#handle.use((raw) => raw.save() as Bytes);
   }
 
   /**

@@ -1,5 +1,5 @@
 import { checkProperties, integer, invalid, shallowCopy, typedArray, vec3 } from './check.js';
-import type { SpaceOptions, Vec3 } from './data.js';
+import type { Bytes, SpaceOptions, Vec3 } from './data.js';
 import { type Mesh, meshHandle, wrapMesh } from './mesh.js';
 import { checkedSpaceOptions, frameOf, type MeshFrame, SPACE_OPTIONS } from './mesh-file.js';
 import { Handle } from './runtime.js';
@@ -452,18 +452,18 @@ export class SurfaceTracker implements Stepper {
    * @param options - `space`, `as` and `unit`: what to state, as in {@link Mesh.toBytes}.
    * @throws {@link VesicleError} `invalid-argument` if no frame tracked so far has a surface; `too-large`.
    */
-  toGlb(options?: SpaceOptions): Uint8Array {
+  toGlb(options?: SpaceOptions): Bytes {
     const frame = checkedSpaceOptions(checkProperties('options', options, SPACE_OPTIONS), this.#frame, true);
     const seconds = Math.min(Math.max(this.#frameSeconds, 0.001), 1000);
-    return this.#use((raw) => raw.toGlb(seconds, notesOf(this.#warnings.of()), ...frame));
+    return this.#use((raw) => raw.toGlb(seconds, notesOf(this.#warnings.of()), ...frame) as Bytes);
   }
 
   /**
    * Saves the whole state except the image, for {@link SurfaceTracker.restore} of a tracker with the same volume, box,
    * component, cavity and start.
    */
-  save(): Uint8Array {
-    return this.#use((raw) => raw.save());
+  save(): Bytes {
+    return this.#use((raw) => raw.save() as Bytes);
   }
 
   /**

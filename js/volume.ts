@@ -13,7 +13,7 @@ import {
   typedArray,
   vec3,
 } from './check.js';
-import type { LengthUnit, Space, Vec3, VolumeFileOptions, VolumeInit, VoxelArray } from './data.js';
+import type { Bytes, LengthUnit, Space, Vec3, VolumeFileOptions, VolumeInit, VoxelArray } from './data.js';
 import { Handle } from './runtime.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
 import { isOfSmall, limitOf, MOST_ENRICHED_OF_SMALL, MOST_WRITTEN_OF_SMALL, noted, notedLike } from './small-files.js';
@@ -136,8 +136,8 @@ export class Volume {
    * frames or the position of the volume, by more than a thousandth of a voxel, would change when rounded to single
    * precision, as NIfTI-1 stores them.
    */
-  toNifti(): Uint8Array {
-    return this.#handle.use((raw) => raw.toNifti());
+  toNifti(): Bytes {
+    return this.#handle.use((raw) => raw.toNifti() as Bytes);
   }
 
   /**
@@ -156,12 +156,12 @@ export class Volume {
    * @throws {@link VesicleError} `invalid-argument`: another format; `too-large`, also for more than 256 MiB of intensities
    *   in place of voxels that come from a file of at most 128 KiB: write those as NIfTI.
    */
-  toBytes(format: VolumeFormat, options: { gzip?: boolean } = {}): Uint8Array {
+  toBytes(format: VolumeFormat, options: { gzip?: boolean } = {}): Bytes {
     choice('format', format, ['nifti', 'nrrd', 'mha']);
     const { gzip = false } = checkProperties('options', options, ['gzip']);
     boolean('gzip', gzip);
     const most = limitOf(undefined, isOfSmall(this), MOST_WRITTEN_OF_SMALL);
-    return this.#handle.use((raw) => raw.toBytes(format, gzip, most));
+    return this.#handle.use((raw) => raw.toBytes(format, gzip, most) as Bytes);
   }
 
   /** Number of voxels along x, y and z. */

@@ -62,3 +62,6 @@ export const mixed = (volume: built.Volume) => new worker.DeformableModel({ volu
 export const made = () => new worker.Mesh();
 // @ts-expect-error
 export const misspelled = (mesh: worker.Mesh) => mesh.area;
+
+/** As of the package. */
+export const file = async (mesh: worker.Mesh): Promise<Blob> => new Blob([await mesh.toBytes('stl')]);
