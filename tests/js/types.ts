@@ -75,6 +75,6 @@ export const multires = (model: built.MultiresolutionModel): contract.Multiresol
 type MultiresOptions = ConstructorParameters<typeof contract.MultiresolutionModel>[0];
 export const newMultires = (options: Own<MultiresOptions>) => new built.MultiresolutionModel(options);
 
-/** What is written goes into files of the browser, in strict TypeScript. */
+/** Files of the browser from all that is written, in strict TypeScript. */
 export const files = (mesh: built.Mesh, volume: built.Volume, model: built.DeformableModel): Blob =>
   new Blob([mesh.toBytes('stl'), volume.toNifti(), volume.toBytes('nrrd'), model.save(), built.animationGlb([mesh])]);
