@@ -192,7 +192,7 @@ export class MultiresolutionModel implements Stepper {
 
   /** Current values of all parameters; a copy. */
   get params(): Required<MultiresParams> {
-    return this.#handle.use((raw) => raw.params() as Required<MultiresParams>);
+    return this.#use((raw) => raw.params() as Required<MultiresParams>);
   }
 
   /**
@@ -200,12 +200,12 @@ export class MultiresolutionModel implements Stepper {
    * still shrinking come last.
    */
   get ellipsoids(): ControlEllipsoid[] {
-    return unpackedEllipsoids(this.#handle.use((raw) => raw.ellipsoids()));
+    return unpackedEllipsoids(this.#use((raw) => raw.ellipsoids()));
   }
 
   /** Copy of the targets of the control ellipsoids, as set by {@link MultiresolutionModel.setEllipsoids}. */
   get targets(): ControlEllipsoid[] {
-    return unpackedEllipsoids(this.#handle.use((raw) => raw.targets()));
+    return unpackedEllipsoids(this.#use((raw) => raw.targets()));
   }
 
   /** Number of surfaces in the multiresolution decomposition, from the base to the detail, both included. */
@@ -239,7 +239,7 @@ export class MultiresolutionModel implements Stepper {
   }
 
   #counts(): Counts {
-    return this.#handle.use((raw) => raw.counts() as Counts);
+    return this.#use((raw) => raw.counts() as Counts);
   }
 
   /**
@@ -253,7 +253,7 @@ export class MultiresolutionModel implements Stepper {
    */
   setEllipsoids(ellipsoids: ControlEllipsoid[]): void {
     const packed = packedEllipsoids(ellipsoids);
-    this.#handle.use((raw) => raw.setEllipsoids(packed));
+    this.#use((raw) => raw.setEllipsoids(packed));
   }
 
   /**
@@ -270,19 +270,49 @@ export class MultiresolutionModel implements Stepper {
   }
 
   /**
-   * Runs until the surface has settled, yielding to the event loop between slices of one or more frames. Ellipsoids and
-   * parameters may be changed meanwhile.
+   * Runs until the surface has settled, yielding to the event loop between slices of work, with `support: 'surface'` also
+   * within a frame. Whatever is asked of the model or its meshes meanwhile ends a frame that is under way first. Ellipsoids
+   * and parameters may be changed meanwhile.
    *
    * @returns The last report.
-   * @throws As {@link MultiresolutionModel.step}; `signal.reason` when aborted, and the model stays usable; any error
+   * @throws As {@link MultiresolutionModel.step}; `signal.reason` when aborted, and the model is as after the last frame that
+   *   ended, and stays usable; any error
    *   thrown by `onStep`.
    */
   run(given?: RunOptions): Promise<StepReport> {
-    return this.#runner.run(() => this.#step(1), given);
+    return this.#runner.run(
+      () => this.#advance(),
+      given,
+      undefined,
+      () => this.#discard(),
+    );
+  }
+
+  /** Does a slice of a step; returns its report at its end. */
+  #advance(): StepReport | undefined {
+    const report = this.#handle.use((raw) => raw.advance() as StepReport | undefined);
+    return report && this.#warnings.take(report);
+  }
+
+  /** Gives up the step that is under way: of it, nothing stays. Returns the report of one that has ended. */
+  #discard(): StepReport | undefined {
+    const report = this.#handle.isFreed
+      ? undefined
+      : this.#handle.use((raw) => raw.discard() as StepReport | undefined);
+    return report && this.#warnings.take(report);
+  }
+
+  /** Calls `work` with the model, once a step of a run that is under way has ended and is reported. */
+  #use<T>(work: (raw: RawMultires) => T): T {
+    this.#runner.settle(() => {
+      const report = this.#handle.use((raw) => raw.settle() as StepReport | undefined);
+      return report && this.#warnings.take(report);
+    });
+    return this.#handle.use(work);
   }
 
   #step(iterations: number): StepReport {
-    return this.#warnings.take(this.#handle.use((raw) => raw.step(iterations) as StepReport));
+    return this.#warnings.take(this.#use((raw) => raw.step(iterations) as StepReport));
   }
 
   /**
@@ -291,7 +321,7 @@ export class MultiresolutionModel implements Stepper {
    * to the smallest stretch over all directions, at most 1000, 1 where angles are preserved.
    */
   distortion(): { area: Float32Array; angle: Float32Array } {
-    return this.#handle.use((raw) => ({ area: raw.distortion(0), angle: raw.distortion(1) }));
+    return this.#use((raw) => ({ area: raw.distortion(0), angle: raw.distortion(1) }));
   }
 
   /**
@@ -299,7 +329,7 @@ export class MultiresolutionModel implements Stepper {
    * multi-level solver, from coarse to fine, to show how it works.
    */
   levelMeshes(): Mesh[] {
-    const levels = this.#handle.use((raw) => raw.levelMeshes());
+    const levels = this.#use((raw) => raw.levelMeshes());
     const warnings = this.#warnings.of();
     return levels.map((level) => wrapMesh(new Handle('Mesh', () => level), false, () => warnings, this.#frame));
   }
@@ -311,7 +341,7 @@ export class MultiresolutionModel implements Stepper {
    */
   setParams(params: MultiresParams): void {
     const values = shallowCopy('params', params);
-    this.#handle.use((raw) => raw.setParams(values));
+    this.#use((raw) => raw.setParams(values));
   }
 
   /**
@@ -319,7 +349,7 @@ export class MultiresolutionModel implements Stepper {
    * ellipsoids.
    */
   save(): Bytes {
-    return this.#handle.use((raw) => raw.save() as Bytes);
+    return this.#use((raw) => raw.save() as Bytes);
   }
 
   /**
@@ -331,7 +361,7 @@ export class MultiresolutionModel implements Stepper {
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
-    this.#handle.use((raw) => raw.restore(state));
+    this.#use((raw) => raw.restore(state));
     this.#warnings.forget();
   }
 

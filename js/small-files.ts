@@ -52,6 +52,9 @@ export const MOST_ENRICHED_OF_SMALL = 384 * 2 ** 20;
 /** Most bytes of intensities that an image of small files may be written as, if it has others than its voxels. */
 export const MOST_WRITTEN_OF_SMALL = 2 ** 28;
 
+/** Most voxels that an image of small files may be resampled to: more would take longer than a few seconds. */
+export const MOST_RESAMPLED_OF_SMALL = 50_000_000;
+
 /** Most vertices of a tracked surface in an image of small files, unless its maker allows more, for the same reason. */
 export const MOST_TRACKED_OF_SMALL = 200_000;
 

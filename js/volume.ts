@@ -16,7 +16,15 @@ import {
 import type { Bytes, LengthUnit, Space, Vec3, VolumeFileOptions, VolumeInit, VoxelArray } from './data.js';
 import { Handle } from './runtime.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
-import { isOfSmall, limitOf, MOST_ENRICHED_OF_SMALL, MOST_WRITTEN_OF_SMALL, noted, notedLike } from './small-files.js';
+import {
+  isOfSmall,
+  limitOf,
+  MOST_ENRICHED_OF_SMALL,
+  MOST_RESAMPLED_OF_SMALL,
+  MOST_WRITTEN_OF_SMALL,
+  noted,
+  notedLike,
+} from './small-files.js';
 import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
 import * as glue from './vesicle.js';
 import { RawVolume } from './vesicle.js';
@@ -447,12 +455,14 @@ export class Volume {
    * @param how - `'linear'` (default) interpolates intensities as {@link Volume.sample} does, `'nearest'` takes the
    *   nearest voxel. Use `'nearest'` for label maps.
    * @throws {@link VesicleError} `invalid-argument`: none or several of the grids, a size out of range, or a volume whose
-   *   file states another unit of length; `too-large`.
+   *   file states another unit of length; `too-large`, also for more than 50 million voxels, in all frames, of an image from
+   *   a file of at most 128 KiB.
    */
   resample(grid: { dims: Vec3 } | { spacing: Vec3 } | { like: Volume }, how: 'linear' | 'nearest' = 'linear'): Volume {
     const resample = resampling(grid);
     const nearest = choice('how', how, ['linear', 'nearest']) === 'nearest';
-    return this.#derived((raw) => resample(raw, nearest));
+    const most = limitOf(undefined, isOfSmall(this), MOST_RESAMPLED_OF_SMALL);
+    return this.#derived((raw) => resample(raw, nearest, most));
   }
 
   /**
@@ -553,7 +563,7 @@ function enrichment(given: { factor?: number; method?: 'flow' | 'linear' }): [nu
 
 function resampling(
   grid: { dims: Vec3 } | { spacing: Vec3 } | { like: Volume },
-): (raw: RawVolume, nearest: boolean) => RawVolume {
+): (raw: RawVolume, nearest: boolean, most?: number) => RawVolume {
   type Grids = { dims: Vec3; spacing: Vec3; like: Volume };
   const names = ['dims', 'spacing', 'like'] as const;
   const given = checkProperties<Partial<Grids>>('grid', shallowCopy('grid', grid), names);
@@ -562,14 +572,14 @@ function resampling(
   }
   if (given.dims !== undefined) {
     const dims = counts('dims', given.dims);
-    return (raw, nearest) => raw.resampleToDims(dims, nearest);
+    return (raw, nearest, most) => raw.resampleToDims(dims, nearest, most);
   }
   if (given.spacing !== undefined) {
     const spacing = vec3('spacing', given.spacing);
-    return (raw, nearest) => raw.resampleToSpacing(spacing, nearest);
+    return (raw, nearest, most) => raw.resampleToSpacing(spacing, nearest, most);
   }
   const like = volumeHandle('like', given.like as Volume);
-  return (raw, nearest) => like.use((other) => raw.resampleLike(other, nearest));
+  return (raw, nearest, most) => like.use((other) => raw.resampleLike(other, nearest, most));
 }
 
 function dims(given: unknown): Uint32Array {

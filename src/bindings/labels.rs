@@ -46,20 +46,35 @@ impl RawVolume {
     /// Returns the volume resampled to `dims` voxels in the same field of view, by nearest voxels if `nearest`, else
     /// linearly.
     #[wasm_bindgen(js_name = resampleToDims)]
-    pub fn resample_to_dims(&self, dims: &[u32], nearest: bool) -> Result<RawVolume, JsValue> {
-        self.resampled(ResampleGrid::Dims(three("dims", dims)?), nearest)
+    pub fn resample_to_dims(
+        &self,
+        dims: &[u32],
+        nearest: bool,
+        most: Option<u32>,
+    ) -> Result<RawVolume, JsValue> {
+        self.resampled(ResampleGrid::Dims(three("dims", dims)?), nearest, most)
     }
 
     /// Returns the volume resampled to voxels of about the size `spacing` in the same field of view.
     #[wasm_bindgen(js_name = resampleToSpacing)]
-    pub fn resample_to_spacing(&self, spacing: &[f64], nearest: bool) -> Result<RawVolume, JsValue> {
-        self.resampled(ResampleGrid::Spacing(point(spacing)?.to_array()), nearest)
+    pub fn resample_to_spacing(
+        &self,
+        spacing: &[f64],
+        nearest: bool,
+        most: Option<u32>,
+    ) -> Result<RawVolume, JsValue> {
+        self.resampled(ResampleGrid::Spacing(point(spacing)?.to_array()), nearest, most)
     }
 
     /// Returns the volume resampled to the grid of another one; voxels outside this one have intensity 0.
     #[wasm_bindgen(js_name = resampleLike)]
-    pub fn resample_like(&self, like: &RawVolume, nearest: bool) -> Result<RawVolume, JsValue> {
-        self.resampled(ResampleGrid::Like(&like.0), nearest)
+    pub fn resample_like(
+        &self,
+        like: &RawVolume,
+        nearest: bool,
+        most: Option<u32>,
+    ) -> Result<RawVolume, JsValue> {
+        self.resampled(ResampleGrid::Like(&like.0), nearest, most)
     }
 
     /// Changes the voxels of one frame in the region of `dims` voxels from index `min` to those of the typed array
@@ -93,9 +108,15 @@ impl RawDeformable {
 }
 
 impl RawVolume {
-    fn resampled(&self, grid: ResampleGrid<'_>, nearest: bool) -> Result<RawVolume, JsValue> {
+    fn resampled(
+        &self,
+        grid: ResampleGrid<'_>,
+        nearest: bool,
+        most: Option<u32>,
+    ) -> Result<RawVolume, JsValue> {
         let how = if nearest { Interpolation::Nearest } else { Interpolation::Linear };
-        Ok(RawVolume(self.0.resample(grid, how).map_err(Failure::from)?))
+        let most = most.map_or(usize::MAX, |most| most as usize);
+        Ok(RawVolume(self.0.resample_within(grid, how, most).map_err(Failure::from)?))
     }
 }
 

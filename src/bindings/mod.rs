@@ -59,7 +59,7 @@ mod readers;
 mod slices;
 #[cfg(all(feature = "sparse", feature = "deformable"))]
 mod sparse;
-#[cfg(any(feature = "deformable", feature = "tracking"))]
+#[cfg(any(feature = "deformable", feature = "tracking", feature = "multires"))]
 mod stepping;
 mod texture;
 #[cfg(feature = "tracking")]

@@ -1,6 +1,7 @@
 //! Bindings of the multiresolution model.
 
 use std::cell::{RefCell, RefMut};
+use std::future::Future;
 use std::rc::Rc;
 use std::task::Poll;
 
@@ -11,13 +12,14 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::{doubles, to_js, with_overrides};
 use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
-use super::method::{method_bindings, shared};
+use super::method::{method_bindings, reported};
+use super::stepping::{LiveStepping, Sliced, Stepping};
 use vesicle::math::DVec3;
 use vesicle::mesh::TriangleMesh;
 use vesicle::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, Support,
 };
-use vesicle::methods::{LiveSurface, MethodError};
+use vesicle::methods::{LiveSurface, MethodError, StepReport};
 use vesicle::pauses::{Computation, advance};
 
 /// Returns the options of a model; properties of `params` replace the default parameters.
@@ -60,7 +62,7 @@ impl RawMultiresCreation {
     pub fn advance(&mut self) -> Result<Option<RawMultires>, JsValue> {
         match advance(&mut self.0) {
             Poll::Pending => Ok(None),
-            Poll::Ready(model) => Ok(Some(RawMultires(shared(model)?))),
+            Poll::Ready(model) => Ok(Some(RawMultires(Stepping::new(model.map_err(Failure::from)?)))),
         }
     }
 }
@@ -68,11 +70,21 @@ impl RawMultiresCreation {
 /// The raw handle of the TypeScript class `MultiresolutionModel`, which shares the model with the live meshes of its
 /// surfaces.
 #[wasm_bindgen]
-pub struct RawMultires(Rc<RefCell<MultiresolutionModel>>);
+pub struct RawMultires(Rc<Stepping<MultiresolutionModel>>);
+
+impl Sliced for MultiresolutionModel {
+    fn step_in_slices(&mut self) -> impl Future<Output = Result<StepReport, MethodError>> {
+        self.step_in_slices()
+    }
+
+    fn discard_step(&mut self) {
+        self.discard_step();
+    }
+}
 
 impl RawMultires {
     fn ready(&self) -> RefMut<'_, MultiresolutionModel> {
-        self.0.borrow_mut()
+        self.0.ready()
     }
 }
 
@@ -82,26 +94,26 @@ method_bindings!(RawMultires, MultiresolutionModel, multiresParamSpecs);
 /// link mesh, which has the triangles of the deformed base with each vertex at its position on the undeformed base (the
 /// map T).
 struct BaseView {
-    model: Rc<RefCell<MultiresolutionModel>>,
+    model: Rc<Stepping<MultiresolutionModel>>,
     is_link: bool,
 }
 
 impl LiveSurface for BaseView {
     fn surface(&self) -> TriangleMesh {
-        let model = self.model.borrow();
+        let model = self.model.ready();
         if self.is_link { model.link_mesh() } else { model.base_surface() }
     }
 
     fn origin(&self) -> DVec3 {
-        self.model.borrow().origin()
+        self.model.ready().origin()
     }
 
     fn counts(&self) -> [usize; 2] {
-        self.model.borrow().base_mesh().counts()
+        self.model.ready().base_mesh().counts()
     }
 
     fn versions(&self) -> [u32; 2] {
-        self.model.borrow().base_mesh().versions()
+        self.model.ready().base_mesh().versions()
     }
 }
 
@@ -120,13 +132,28 @@ impl RawMultires {
         holds_itself: bool,
     ) -> Result<RawMultires, JsValue> {
         let options = options(detail, base, ellipsoids, params, holds_itself)?;
-        Ok(RawMultires(shared(MultiresolutionModel::new(options))?))
+        Ok(RawMultires(Stepping::new(MultiresolutionModel::new(options).map_err(Failure::from)?)))
+    }
+
+    /// Does a slice of a step; returns what `step` returns at its end, else undefined.
+    pub fn advance(&self) -> Result<JsValue, JsValue> {
+        self.0.advance().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(report)?))
+    }
+
+    /// Ends the step that is under way; returns the report of a step that has ended since the last slice, else undefined.
+    pub fn settle(&self) -> Result<JsValue, JsValue> {
+        self.0.settle().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(report)?))
+    }
+
+    /// Gives up the step that is under way; returns the report of one that has ended since the last slice, else undefined.
+    pub fn discard(&self) -> Result<JsValue, JsValue> {
+        self.0.discard().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(Ok(report))?))
     }
 
     /// Returns a live mesh of the model: the detailed surface (0), the deformed base (1) or the link mesh (2).
     pub fn mesh(&self, which: u32) -> RawMesh {
         if which == 0 {
-            return RawMesh::live(&self.0);
+            return RawMesh::live(&Rc::new(RefCell::new(LiveStepping(Rc::clone(&self.0)))));
         }
         RawMesh::live(&Rc::new(RefCell::new(BaseView { model: Rc::clone(&self.0), is_link: which > 1 })))
     }
@@ -135,7 +162,7 @@ impl RawMultires {
     /// each, from coarse to fine.
     #[wasm_bindgen(js_name = levelMeshes)]
     pub fn level_meshes(&self) -> Vec<RawMesh> {
-        let levels = self.0.borrow().levels();
+        let levels = self.ready().levels();
         levels.into_iter().map(|mesh| RawMesh(triangle_list(mesh))).collect()
     }
 
@@ -143,27 +170,27 @@ impl RawMultires {
     /// centre and three semi-axis vectors.
     #[wasm_bindgen(js_name = setEllipsoids)]
     pub fn set_ellipsoids(&self, ellipsoids: &Float64Array) -> Result<(), JsValue> {
-        self.0.borrow_mut().set_ellipsoids(&unpacked(ellipsoids)?).map_err(Failure::from)?;
+        self.ready().set_ellipsoids(&unpacked(ellipsoids)?).map_err(Failure::from)?;
         Ok(())
     }
 
     /// Returns the current ellipsoids, including those that are being removed: twelve numbers each, the centre and
     /// three semi-axis vectors.
     pub fn ellipsoids(&self) -> Vec<f64> {
-        packed(&self.0.borrow().ellipsoids())
+        packed(&self.ready().ellipsoids())
     }
 
     /// Returns the target ellipsoids, without those that are being removed: twelve numbers each, the centre and three
     /// semi-axis vectors.
     pub fn targets(&self) -> Vec<f64> {
-        packed(&self.0.borrow().targets())
+        packed(&self.ready().targets())
     }
 
     /// Returns for each vertex of the deformed base how much the map T to the undeformed base distorts areas (`which`
     /// 0: the area on the undeformed base divided by that on the deformed one) or angles (any other: the ratio of the
     /// largest to the smallest stretch); 1 without distortion.
     pub fn distortion(&self, which: u32) -> Vec<f32> {
-        let found = self.0.borrow().distortion();
+        let found = self.ready().distortion();
         let values = if which == 0 { found.area } else { found.angle };
         values.into_iter().map(|value| value as f32).collect()
     }
@@ -172,7 +199,7 @@ impl RawMultires {
     /// the map T; and, in the last reconstruction of detail, vertices whose normal missed the finer surface, and
     /// vertices held back to avoid self-intersections.
     pub fn counts(&self) -> Result<JsValue, JsValue> {
-        let model = self.0.borrow();
+        let model = self.ready();
         let [unmatched_vertices, held_vertices] = model.detail_counts();
         Ok(to_js(&Counts {
             band_count: model.band_count(),

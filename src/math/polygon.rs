@@ -7,20 +7,26 @@
 use super::order::sort_pairs;
 use super::predicates::orient2d;
 use super::{DVec2, DVec3};
+use crate::pauses::{Pauses, finished};
 
 /// The part of a face's area by which a triangle of its fan may face backwards, by rounding.
 const FOLD: f64 = 1e-6;
+
+/// Numbers of corners that are sorted, and of those tested, in a unit of work.
+const SORTED_PER_UNIT: usize = 32;
+const TESTED_PER_UNIT: usize = 512;
 
 /// Returns triangles that cover the interior of polygons, which is on the left of their edges: outer loops are
 /// counter-clockwise, holes clockwise, and a hole may contain further polygons. Each loop lists indices into `points`;
 /// all of them become corners, and no others. Triangles are counter-clockwise.
 ///
 /// Returns `None` if a loop has fewer than three points or intersects itself or another one. The time is quadratic in
-/// the number of points.
-pub fn triangulate(points: &[DVec2], loops: &[Vec<u32>]) -> Option<Vec<[u32; 3]>> {
+/// the number of points. Pauses meanwhile.
+pub async fn triangulate(points: &[DVec2], loops: &[Vec<u32>], pauses: &Pauses) -> Option<Vec<[u32; 3]>> {
     let mut polygon = Polygon::new(points, loops)?;
-    polygon.bridge_holes()?;
-    polygon.clip_ears()
+    pauses.now().await;
+    polygon.bridge_holes(pauses).await?;
+    polygon.clip_ears(pauses).await
 }
 
 /// Returns triangles of a face with the given corners, as indices into them; `None` if the fan of the first corner is
@@ -131,7 +137,7 @@ impl<'a> Polygon<'a> {
     }
 
     /// Connects each hole with a loop of lower corners, from the lowest hole on, so that only outer loops are left.
-    fn bridge_holes(&mut self) -> Option<()> {
+    async fn bridge_holes(&mut self, pauses: &Pauses) -> Option<()> {
         let mut holes = Vec::new();
         for &first in &self.loops {
             let turn = self.turn(self.previous[first], first, self.next[first]);
@@ -142,10 +148,11 @@ impl<'a> Polygon<'a> {
                 holes.push(first);
             }
         }
+        pauses.now().await;
         self.loops.retain(|first| !holes.contains(first));
         holes.sort_by(|&i, &j| self.compare(i, j));
         for hole in holes {
-            let end = self.bridge_end(hole)?;
+            let end = self.bridge_end(hole, pauses).await?;
             self.bridge(hole, end);
         }
         Some(())
@@ -153,12 +160,21 @@ impl<'a> Polygon<'a> {
 
     /// Returns the nearest corner that is visible from the lowest corner of a hole, among those that are lower: such a
     /// corner always exists, and is of an outer loop, or of a lower hole.
-    fn bridge_end(&self, hole: usize) -> Option<usize> {
+    async fn bridge_end(&self, hole: usize, pauses: &Pauses) -> Option<usize> {
         let mut lower: Vec<usize> =
             (0..self.point.len()).filter(|&corner| self.compare(corner, hole).is_lt()).collect();
         let square = |corner: usize| self.at(corner).distance_squared(self.at(hole));
         lower.sort_by(|&i, &j| square(i).total_cmp(&square(j)).then(i.cmp(&j)));
-        lower.into_iter().find(|&end| self.sees(hole, end) && self.sees(end, hole) && self.is_free(hole, end))
+        pauses.after(self.point.len() / SORTED_PER_UNIT).await;
+        for end in lower {
+            if self.sees(hole, end) && self.sees(end, hole) {
+                pauses.after(self.point.len() / TESTED_PER_UNIT).await;
+                if self.is_free(hole, end) {
+                    return Some(end);
+                }
+            }
+        }
+        None
     }
 
     /// Returns whether the direction from one corner to another points into the interior of the polygon.
@@ -211,10 +227,10 @@ impl<'a> Polygon<'a> {
         self.previous[after_a] = copy_of_a;
     }
 
-    fn clip_ears(&mut self) -> Option<Vec<[u32; 3]>> {
+    async fn clip_ears(&mut self, pauses: &Pauses) -> Option<Vec<[u32; 3]>> {
         let (mut triangles, mut effort) = (Vec::with_capacity(self.point.len()), u64::MAX);
         for first in self.loops.clone() {
-            self.clip_ears_of(first, &mut triangles, &mut effort, |_, _| None)?;
+            self.clip_ears_of(first, &mut triangles, &mut effort, |_, _| None, pauses).await?;
         }
         Some(triangles.into_iter().map(|corners| corners.map(|corner| self.point[corner as usize])).collect())
     }
@@ -227,23 +243,25 @@ impl<'a> Polygon<'a> {
                 |&corner: &usize| polygon.turn(polygon.previous[corner], corner, polygon.next[corner]).abs();
             polygon.corners(first).min_by(|a, b| size(a).total_cmp(&size(b)))
         };
-        self.clip_ears_of(0, &mut triangles, effort, flattest);
+        finished(self.clip_ears_of(0, &mut triangles, effort, flattest, &Pauses::default()));
         triangles
     }
 
     /// Clips the ears of the loop of a corner, and appends the triangles, as corners. Where there is no ear, `instead`
     /// chooses the corner to clip; `None` if it doesn't. After `effort` tests of points, the rest becomes a fan.
-    fn clip_ears_of(
+    async fn clip_ears_of(
         &mut self,
         first: usize,
         triangles: &mut Vec<[u32; 3]>,
         effort: &mut u64,
         instead: impl Fn(&Self, usize) -> Option<usize>,
+        pauses: &Pauses,
     ) -> Option<()> {
         let mut left = self.corners(first).count();
         let (mut corner, mut misses) = (first, 0);
         while left > 3 {
             *effort = effort.saturating_sub(left as u64);
+            pauses.after(left / TESTED_PER_UNIT).await;
             if misses > left {
                 corner = instead(self, corner)?;
             } else if *effort > 0 && !self.is_ear(corner) {
@@ -298,7 +316,8 @@ mod tests {
 
     /// Triangulates, and checks that the triangles face upwards, use all points, and cover the polygon's area.
     fn assert_covers(points: &[DVec2], loops: &[Vec<u32>]) {
-        let triangles = triangulate(points, loops).expect("the polygon is simple");
+        let triangles =
+            finished(triangulate(points, loops, &Pauses::default())).expect("the polygon is simple");
         assert!(triangles.iter().all(|t| area(points, t) > 0.0));
         let covered: f64 = triangles.iter().map(|t| area(points, t)).sum();
         let enclosed: f64 = loops.iter().map(|corners| area(points, corners)).sum();
@@ -450,11 +469,13 @@ mod tests {
     #[test]
     fn loops_that_intersect_are_rejected() {
         let points = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 1.0]].map(DVec2::from);
-        assert_eq!(triangulate(&points, &[vec![0, 1, 2, 3]]), None);
-        assert_eq!(triangulate(&points, &[vec![0, 1]]), None);
+        let covered =
+            |points: &[DVec2], loops: &[Vec<u32>]| finished(triangulate(points, loops, &Pauses::default()));
+        assert_eq!(covered(&points, &[vec![0, 1, 2, 3]]), None);
+        assert_eq!(covered(&points, &[vec![0, 1]]), None);
         let mut points = Vec::new();
         let outer = square(&mut points, DVec2::ZERO, 4.0, 1, false);
         let beside = square(&mut points, DVec2::new(5.0, 0.0), 1.0, 1, true);
-        assert_eq!(triangulate(&points, &[outer, beside]), None);
+        assert_eq!(covered(&points, &[outer, beside]), None);
     }
 }

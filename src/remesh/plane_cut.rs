@@ -106,7 +106,9 @@ async fn cut_at(mesh: &Mesh, heights: &[f64], normal: DVec3, pauses: &Pauses) ->
     let points: Vec<DVec2> =
         part.surface.positions[part.rim_start as usize..].iter().map(|&p| projected(p, normal)).collect();
     pauses.now().await;
-    let cap = triangulate(&points, &part.rims()?)?;
+    let rims = part.rims()?;
+    pauses.now().await;
+    let cap = triangulate(&points, &rims, pauses).await?;
     pauses.now().await;
     part.surface.triangles.extend(cap.into_iter().map(|corners| corners.map(|k| part.rim_start + k)));
     let mut closed = Mesh::from_triangles(&part.surface).ok()?;

@@ -41,11 +41,29 @@ impl Volume {
     /// [`VolumeError::InvalidArgument`] for dimensions of 0, a spacing that is not positive and finite, or another
     /// volume in another unit of length; [`VolumeError::TooLarge`].
     pub fn resample(&self, grid: ResampleGrid<'_>, how: Interpolation) -> Result<Volume, VolumeError> {
+        self.resample_within(grid, how, usize::MAX)
+    }
+
+    /// Returns what [`Self::resample`] does, of at most `most` voxels in all frames.
+    ///
+    /// # Errors
+    /// As [`Self::resample`]; [`VolumeError::TooLarge`] for more voxels.
+    pub fn resample_within(
+        &self,
+        grid: ResampleGrid<'_>,
+        how: Interpolation,
+        most: usize,
+    ) -> Result<Volume, VolumeError> {
         let target = match grid {
             ResampleGrid::Dims(dims) => self.target_of_dims(dims)?,
             ResampleGrid::Spacing(spacing) => self.target_of_spacing(spacing)?,
             ResampleGrid::Like(other) => self.target_like(other)?,
         };
+        let voxels = target.len().saturating_mul(self.frames());
+        if voxels > most {
+            let bytes = (voxels as u64).saturating_mul(self.voxels.voxel_bytes() as u64);
+            return Err(VolumeError::TooLarge { bytes });
+        }
         let voxels = map_each!(self.voxels.as_ref(), stored => self.resampled(stored, &target, how)?);
         let [nx, ny, nz] = target.dims;
         let volume = Volume::new(VolumeInit {

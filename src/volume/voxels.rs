@@ -116,10 +116,19 @@ impl VoxelNumber for f64 {
     }
 }
 
+const fn element_size<T>(_: &[T]) -> usize {
+    size_of::<T>()
+}
+
 impl Voxels {
     /// Returns the number of voxels.
     pub fn len(&self) -> usize {
         each!(self, values => values.len())
+    }
+
+    /// Returns the number of bytes of a voxel.
+    pub(super) fn voxel_bytes(&self) -> usize {
+        each!(self, values => element_size(values))
     }
 
     /// Returns whether there are no voxels.

@@ -44,8 +44,13 @@ impl Crossings {
     /// Returns the warning about them, if there are any.
     pub fn warning(&self) -> Option<Warning> {
         self.any().then(|| {
-            let what = "The surface intersects itself as given. Its components that do, with themselves or each other, are \
-                        not kept from doing so; all others are. Repair it before, or remesh it, if that matters.";
+            let what = if self.pairs.is_none() {
+                "So many triangles of the surface overlap that it is not known whether it intersects itself as given: it is not \
+                 kept from doing so. Remesh it before, if that matters."
+            } else {
+                "The surface intersects itself as given. Its components that do, with themselves or each other, are \
+                        not kept from doing so; all others are. Repair it before, or remesh it, if that matters."
+            };
             Warning::new(WarningCode::SelfIntersecting, what)
         })
     }

@@ -11,6 +11,7 @@ use super::ellipsoid::Ellipsoid;
 use super::frame::Lap;
 use super::grip::gripped;
 use super::handles::{Handle, Motion, motion_at};
+use super::motion::MovingEllipsoids;
 use super::setup::identity;
 use super::topology::displacements_to;
 use super::{ControlEllipsoid, MAX_VERTICES, MultiresolutionModel, typical_edge};
@@ -62,6 +63,9 @@ const PASSES: usize = 40;
 /// Number of edges that are halved between two pauses: around a vertex of thousands of edges, each takes a millisecond.
 const EDGES_AT_ONCE: usize = 64;
 
+/// Number of triangles around vertices that are tested in a unit of work.
+const TESTED_PER_UNIT: usize = 32;
+
 /// A surface with the point of the given one for each vertex.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Placed {
@@ -94,6 +98,17 @@ pub(super) struct Held {
     /// Number of times that the next step of the handles is halved: one attempt a frame, so that none takes long.
     halvings: u32,
     crossings: Crossings,
+}
+
+/// The state before a frame that is under way.
+#[derive(Debug)]
+pub(super) struct Before {
+    surface: Mesh,
+    correspondence: Correspondence,
+    handles: SavedHandles,
+    ellipsoids: MovingEllipsoids,
+    iteration: u32,
+    residual: f64,
 }
 
 /// Handles as they are saved.
@@ -274,18 +289,19 @@ impl Held {
     }
 
     /// Has the surface follow the handles, as [`Self::advance`] does, or back to what it is without them.
-    fn follow(
+    async fn follow(
         &mut self,
         now: &mut Placed,
         surface: &SurfaceWalker,
         guard: &mut Embedding,
         longest: f32,
         returns: bool,
+        pauses: &Pauses,
     ) -> Option<(usize, f64)> {
         if !self.is_at_rest() {
             let most = (MOST_BLOCKED * now.mesh.vertex_count() as f64) as usize;
             let most = if returns { usize::MAX } else { most.max(LEAST_BLOCKED) };
-            return self.advance(now, surface, guard, longest, most);
+            return self.advance(now, surface, guard, longest, most, pauses).await;
         }
         let mesh = replacement(self.start.mesh.clone(), &now.mesh);
         *now = Placed { mesh, ..self.start.clone() };
@@ -295,14 +311,16 @@ impl Held {
 
     /// Moves the surface to where the handles move it, as far as it does not intersect itself, and halves edges longer than
     /// `longest` where they have stretched it. Returns the number of halved edges, and the root mean square of the
-    /// displacements, in units of the mesh; `None`, with nothing moved, if more than `most` vertices cannot follow.
-    fn advance(
+    /// displacements, in units of the mesh; `None`, with nothing moved, if more than `most` vertices cannot follow. Pauses
+    /// meanwhile.
+    async fn advance(
         &mut self,
         now: &mut Placed,
         surface: &SurfaceWalker,
         guard: &mut Embedding,
         longest: f32,
         most: usize,
+        pauses: &Pauses,
     ) -> Option<(usize, f64)> {
         let targets: Vec<Vec3> = (0..now.mesh.slots())
             .map(|i| self.target(&now.points, &now.distances, VertexId::from_index(i)))
@@ -312,20 +330,44 @@ impl Held {
         self.crossings.exempt_from(guard, &now.points);
         let moving: Vec<VertexId> =
             now.mesh.vertices().filter(|v| displacements[v.index()] != Vec3::ZERO).collect();
-        guard.move_some_unless(&mut now.mesh, &moving, &mut displacements, most)?;
+        guard.move_some_unless(&mut now.mesh, &moving, &mut displacements, most, pauses).await?;
         let is_stretched = |u: VertexId, v: VertexId| {
             let [p, q] = [u, v].map(|end| now.points[end.index()].point);
             let length = targets[u.index()].distance(targets[v.index()]);
             length > longest && length > STRETCH * p.distance(q)
         };
         let stretched = long_edges(&now.mesh, is_stretched);
-        let split = halve_edges(now, surface, &stretched, |mesh, u, v, at| {
-            guard.attempt(mesh, |mesh| mesh.split(u, v, at))
-        });
+        let mut split = 0;
+        for edge in stretched {
+            let tested = guard.tested_around();
+            split += halve_edges(now, surface, &[edge], |mesh, u, v, at| {
+                guard.attempt(mesh, |mesh| mesh.split(u, v, at))
+            });
+            pauses.after(1 + (guard.tested_around() - tested) as usize / TESTED_PER_UNIT).await;
+        }
         // The new vertices are moved in the next frame.
         self.is_unsettled = split > 0;
         let sum: f64 = displacements.iter().map(|d| f64::from(d.length_squared())).sum();
         Some((split, (sum / now.mesh.vertex_count().max(1) as f64).sqrt()))
+    }
+
+    /// After a step that the surface could not follow, has the next be half as long, or if it is short already, stops the
+    /// handles.
+    fn halve_or_stop(&mut self, ellipsoids: &mut MovingEllipsoids) {
+        let have_arrived = ellipsoids.have_arrived();
+        if !have_arrived && self.halvings < MOST_HALVINGS {
+            self.halvings += 1;
+            return;
+        }
+        self.is_unsettled = false;
+        self.has_stopped |= !have_arrived;
+        ellipsoids.stop();
+    }
+
+    fn set_back(&mut self, before: SavedHandles) {
+        let SavedHandles { handles, distances, is_unsettled, has_stopped, halvings } = before;
+        (self.handles, self.distances) = (handles, distances);
+        (self.is_unsettled, self.has_stopped, self.halvings) = (is_unsettled, has_stopped, halvings);
     }
 
     /// Returns what is to be saved.
@@ -357,11 +399,14 @@ impl Held {
 }
 
 impl MultiresolutionModel {
-    /// Advances a surface that holds itself by one frame; returns the edits made.
-    pub(super) fn held_frame(&mut self, times: &mut Times) -> Changes {
+    /// Advances a surface that holds itself by one frame; returns the edits made. Where the future is dropped in the middle,
+    /// the model must not be used before it is [set back](Self::discard_step).
+    pub(super) async fn held_frame(&mut self, times: &mut Times, pauses: &Pauses) -> Changes {
         let mut lap = Lap::new(self.clock, times);
         let longest = self.model_params.edge_max as f32;
-        let (mut now, Some(mut held)) = (self.take_placed(), self.held.take()) else {
+        let mut now = self.take_placed();
+        let Some(held) = &mut self.held else {
+            self.put_placed(now);
             return Changes::default();
         };
         let before = (self.ellipsoids.clone(), held.handles.clone());
@@ -372,33 +417,45 @@ impl MultiresolutionModel {
             held.handles.iter().zip(&before.1).map(|(now, before)| before.deviation() - now.deviation());
         let returns = closer.clone().all(|by| by >= 0.0) && closer.clone().any(|by| by > 0.0);
         lap.end("motion");
-        let done = held.follow(&mut now, &self.bands.base().walker, &mut self.guard, longest, returns);
+        let walker = &self.bands.base().walker;
+        let done = held.follow(&mut now, walker, &mut self.guard, longest, returns, pauses).await;
         lap.end("surface");
         let (splits, moved) = done.unwrap_or_default();
         if done.is_some() {
             held.halvings = held.halvings.saturating_sub(1);
         } else {
             (self.ellipsoids, held.handles) = before;
-            self.halve_or_stop(&mut held);
+            held.halve_or_stop(&mut self.ellipsoids);
         }
         self.residual = moved / self.model_params.target();
-        self.put_placed(now, held);
+        self.put_placed(now);
         self.show_held();
         lap.end("detail");
         Changes { creations: splits as u32, ..Changes::default() }
     }
 
-    /// After a step that the surface could not follow, has the next be half as long, or if it is short already, stops the
-    /// handles.
-    fn halve_or_stop(&mut self, held: &mut Held) {
-        let have_arrived = self.ellipsoids.have_arrived();
-        if !have_arrived && held.halvings < MOST_HALVINGS {
-            held.halvings += 1;
-            return;
-        }
-        held.is_unsettled = false;
-        held.has_stopped |= !have_arrived;
-        self.ellipsoids.stop();
+    /// Keeps a copy of what a frame of a surface that holds itself changes.
+    pub(super) fn keep_state_before(&mut self) {
+        self.before = self.held.as_ref().map(|held| {
+            Box::new(Before {
+                surface: self.surface.clone(),
+                correspondence: self.correspondence.clone(),
+                handles: held.save(),
+                ellipsoids: self.ellipsoids.clone(),
+                iteration: self.iteration,
+                residual: self.residual,
+            })
+        });
+    }
+
+    /// Sets the model back to the end of the last step, after the future of [`Self::step_in_slices`] was dropped in the middle.
+    pub fn discard_step(&mut self) {
+        let (Some(before), Some(held)) = (self.before.take(), &mut self.held) else { return };
+        let Before { surface, correspondence, handles, ellipsoids, iteration, residual } = *before;
+        held.set_back(handles);
+        (self.surface, self.correspondence, self.ellipsoids) = (surface, correspondence, ellipsoids);
+        (self.iteration, self.residual) = (iteration, residual);
+        self.guard = Embedding::default();
     }
 
     /// Shows the surface as given if all handles have their poses at rest, else as they have moved it.
@@ -444,7 +501,8 @@ impl MultiresolutionModel {
             let walker = SurfaceWalker::new(now.mesh.to_triangles())?;
             added.iter().for_each(|added| held.add(Ellipsoid::new(added), &mut now, &walker));
         }
-        self.put_placed(now, held);
+        self.held = Some(held);
+        self.put_placed(now);
         Ok(())
     }
 
@@ -456,9 +514,11 @@ impl MultiresolutionModel {
         }
     }
 
-    fn put_placed(&mut self, now: Placed, mut held: Held) {
-        (self.surface, self.correspondence, held.distances) = (now.mesh, now.points, now.distances);
-        self.held = Some(held);
+    fn put_placed(&mut self, now: Placed) {
+        (self.surface, self.correspondence) = (now.mesh, now.points);
+        if let Some(held) = &mut self.held {
+            held.distances = now.distances;
+        }
     }
 }
 
@@ -550,11 +610,70 @@ fn halve_edges(
 mod tests {
     use super::*;
     use crate::math::Random;
-    use crate::pauses::finished;
+    use crate::methods::multires::{MultiresOptions, Support};
+    use crate::pauses::{advance, finished};
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
     /// On some of these, the walk from a triangle to the middle of an edge ends elsewhere.
+    /// Returns a model of a sphere whose first handle moves.
+    fn moving() -> MultiresolutionModel {
+        let ball = Mesh::icosphere(Vec3::ZERO, 1.0, 0.2).unwrap().to_triangles();
+        let handle = |x: f64| ControlEllipsoid {
+            center: [x, 0.0, 0.0],
+            axes: [[0.3, 0.0, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 0.3]],
+        };
+        let options = MultiresOptions {
+            detail: Some(ball),
+            ellipsoids: vec![handle(0.5), handle(-0.5)],
+            support: Support::Surface,
+            ..MultiresOptions::default()
+        };
+        let mut model = MultiresolutionModel::new(options).unwrap();
+        model.set_ellipsoids(&[handle(1.6), handle(-0.5)]).unwrap();
+        model
+    }
+
+    #[test]
+    fn frames_in_slices_have_the_same_bits_and_leave_nothing_if_given_up() {
+        let (mut whole, mut sliced) = (moving(), moving());
+        let (mut most, mut given_up, mut frames) = (0, 0, 0);
+        loop {
+            for slices in [1, 2, 5] {
+                let mut step = Box::pin(sliced.step_in_slices());
+                let ended = (0..slices).any(|_| advance(&mut step).is_ready());
+                drop(step);
+                if ended {
+                    break;
+                }
+                given_up += 1;
+                sliced.discard_step();
+                assert_eq!(
+                    (sliced.save(), sliced.mesh().versions()),
+                    (whole.save(), whole.mesh().versions())
+                );
+            }
+            // Where a frame has ended before it could be given up, the other makes it, too.
+            if sliced.iteration > whole.iteration {
+                whole.step().unwrap();
+            }
+            let mut slices = 0;
+            let mut step = Box::pin(sliced.step_in_slices());
+            while advance(&mut step).is_pending() {
+                slices += 1;
+            }
+            drop(step);
+            most = slices.max(most);
+            let report = whole.step().unwrap();
+            assert_eq!(sliced.save(), whole.save());
+            frames += 1;
+            if report.done || frames == 40 {
+                break;
+            }
+        }
+        assert!(most > 3 && given_up > 10, "{most} {given_up}");
+    }
+
     #[test]
     fn edges_are_halved_on_the_surface() {
         for seed in 0..20 {

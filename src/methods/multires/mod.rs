@@ -56,7 +56,7 @@ use containment::contains_centres;
 use correspondence::{Correspondence, Current, folded, project};
 use detail::{Bands, DetailSampling, Detailed, detailed, detailed_in_slices};
 use ellipsoid::{Ellipsoid, check_ellipsoids, check_tips};
-use held::{Held, Placed};
+use held::{Before, Held, Placed};
 use membrane::{pushed_positions, solve_with};
 use motion::MovingEllipsoids;
 use proposal::proposed;
@@ -110,6 +110,8 @@ pub struct MultiresolutionModel {
     detailed: Detailed,
     /// The handles of a surface that holds itself; `None` for a membrane.
     held: Option<Held>,
+    /// The state before a step in slices that is under way.
+    before: Option<Box<Before>>,
     /// The collision guard, which shortens displacements so that no triangles intersect. Only its memory is reused
     /// between frames, not its state.
     guard: Embedding,
@@ -222,6 +224,7 @@ impl MultiresolutionModel {
             correspondence,
             detailed,
             held: None,
+            before: None,
             guard,
             iteration: 0,
             refreshed_frames: 0,
@@ -279,6 +282,7 @@ impl MultiresolutionModel {
             correspondence: points,
             detailed,
             held: Some(held),
+            before: None,
             guard: Embedding::default(),
             iteration: 0,
             refreshed_frames: 0,
@@ -466,11 +470,32 @@ impl MultiresolutionModel {
     /// [`MethodError::TooManyVertices`] if the membrane would grow too large for its edge bounds; [`MethodError::Mesh`]
     /// if a position is not finite. The surface is then unchanged.
     pub fn step(&mut self) -> Result<StepReport, MethodError> {
+        finished(self.one_step(&Pauses::default()))
+    }
+
+    /// Makes one step as [`Self::step`] does, bit for bit, in [slices](crate::pauses) if the surface holds itself. Where the
+    /// future is dropped in the middle, the model must not be used before [`Self::discard_step`].
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub async fn step_in_slices(&mut self) -> Result<StepReport, MethodError> {
+        if !self.is_done() {
+            self.keep_state_before();
+        }
+        let report = self.one_step(&Pauses::default()).await;
+        self.before = None;
+        report
+    }
+
+    async fn one_step(&mut self, pauses: &Pauses) -> Result<StepReport, MethodError> {
         let mut times = Times::default();
         let mut changes = Changes::default();
         if !self.is_done() {
             self.iteration = self.iteration.wrapping_add(1);
-            changes = if self.held.is_some() { self.held_frame(&mut times) } else { self.frame(&mut times)? };
+            changes = match self.held {
+                Some(_) => self.held_frame(&mut times, pauses).await,
+                None => self.frame(&mut times)?,
+            };
         }
         Ok(self.report(changes, times))
     }

@@ -114,6 +114,8 @@ pub struct Embedding {
     effort: u64,
     /// Number of triangles around vertices that were tested after edits, the work besides [`Self::effort`].
     tested_around: u64,
+    /// Number of pairs of triangles at two vertices that were compared, since it was last taken.
+    compared: usize,
     /// The output space (world space in single precision), in which triangles must not intersect either, if it is
     /// watched.
     output: Option<OutputSpace>,
@@ -274,7 +276,7 @@ impl Embedding {
 
     /// Returns the number of triangles around vertices that were tested after edits so far: thousands for each edit beside
     /// a hub of as many.
-    pub(super) fn tested_around(&self) -> u64 {
+    pub(crate) fn tested_around(&self) -> u64 {
         self.tested_around
     }
 

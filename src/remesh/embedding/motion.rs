@@ -46,22 +46,12 @@ impl Embedding {
         displacements: &mut [Vec3],
         pauses: &Pauses,
     ) -> Vec<(VertexId, f32)> {
-        self.try_to_move(mesh, moving, displacements, usize::MAX, pauses).await.unwrap_or_default()
+        self.move_some_unless(mesh, moving, displacements, usize::MAX, pauses).await.unwrap_or_default()
     }
 
-    /// Moves vertices as [`Self::move_some`] does; returns `None`, with nothing moved, if more than `most` of them would
-    /// have to be held back.
-    pub fn move_some_unless(
-        &mut self,
-        mesh: &mut Mesh,
-        moving: &[VertexId],
-        displacements: &mut [Vec3],
-        most: usize,
-    ) -> Option<Vec<(VertexId, f32)>> {
-        finished(self.try_to_move(mesh, moving, displacements, most, &Pauses::default()))
-    }
-
-    async fn try_to_move(
+    /// Moves vertices as [`Self::move_some`] does, and pauses meanwhile; returns `None`, with nothing moved, if more than
+    /// `most` of them would have to be held back.
+    pub async fn move_some_unless(
         &mut self,
         mesh: &mut Mesh,
         moving: &[VertexId],

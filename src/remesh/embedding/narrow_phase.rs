@@ -24,6 +24,9 @@ const MANY_PAIRS: usize = 32 * PAIRS_PER_UNIT;
 /// The number of pairs of one-rings whose tests are a unit of work.
 const PAIRS_PER_UNIT: usize = 16;
 
+/// Number of pairs of triangles whose comparison takes as long as the test of a pair of vertices.
+const COMPARED_PER_PAIR: usize = 32;
+
 /// The largest number of vertices near one that are looked through for another: where a mesh intersects itself
 /// everywhere, time would be cubic.
 const MOST_CERTIFIED: usize = 256;
@@ -89,6 +92,7 @@ impl Embedding {
                     self.check_wide_ring(mesh, v, &mut intersecting, pauses).await
                 } else {
                     self.check_vertex(mesh, v, &mut intersecting)
+                        + std::mem::take(&mut self.compared) / COMPARED_PER_PAIR
                 };
                 if pairs >= MANY_PAIRS {
                     break;
@@ -207,7 +211,7 @@ impl Embedding {
         }
     }
 
-    fn clearance_along_edge(&self, mesh: &Mesh, pair: [VertexId; 2], opposite: [VertexId; 2]) -> f32 {
+    fn clearance_along_edge(&mut self, mesh: &Mesh, pair: [VertexId; 2], opposite: [VertexId; 2]) -> f32 {
         let longest = self.longest_of(pair[0], pair[1]);
         let mut clearance = plane_clearance(mesh, pair, opposite, longest);
         if !self.is_ample(clearance) {
@@ -233,7 +237,8 @@ impl Embedding {
             if let Some(left) = self.certificates.left([v, w], until) {
                 self.lower_bounds(Check::Nearby, [v, w], left);
             } else if !self.is_checked_from(w, v, Check::Nearby) {
-                let clearance = self.or_triangle_clearance(mesh, [v, w], self.nearby_clearance(mesh, [v, w]));
+                let clearance = self.nearby_clearance(mesh, [v, w]);
+                let clearance = self.or_triangle_clearance(mesh, [v, w], clearance);
                 let until = self.record_clearance(mesh, [v, w], Check::Nearby, clearance, intersecting);
                 self.certify_nearby(v, k, until);
                 // Without it, the pair is tested once more at worst.
@@ -288,10 +293,11 @@ impl Embedding {
 
     /// Returns `clearance`, which planes between two one-rings have given, if it is above [`AMPLE`]; otherwise the
     /// clearance between their individual triangles, if that is larger.
-    fn or_triangle_clearance(&self, mesh: &Mesh, [v, w]: [VertexId; 2], clearance: f32) -> f32 {
+    fn or_triangle_clearance(&mut self, mesh: &Mesh, [v, w]: [VertexId; 2], clearance: f32) -> f32 {
         if self.is_ample(clearance) {
             return clearance;
         }
+        self.compared += mesh.ring(v).valence() * mesh.ring(w).valence();
         higher(clearance, triangle_clearance(mesh, [v, w], self.longest_of(v, w), AMPLE * self.ordinary_edge))
     }
 
