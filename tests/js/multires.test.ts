@@ -176,6 +176,53 @@ test('an aborted run can continue', async () => {
   expect((await skin.run()).done).toBe(true);
 });
 
+test('a run yields within frames of a surface that holds itself: an abort leaves the model as after the last frame', async () => {
+  const make = () => {
+    const made = model({ detail: wavy(0.08), ellipsoids: [ball(0.4, 0.3), ball(-0.4, 0.3)], params: {} });
+    made.setEllipsoids([ball(1.5, 0.3), ball(-0.4, 0.3)]);
+    return made;
+  };
+  const [whole, sliced] = [make(), make()];
+  const expectSame = () => expect(Buffer.from(sliced.save()).equals(Buffer.from(whole.save()))).toBe(true);
+  let withinFrames = 0;
+  for (let round = 1; round <= 5; round++) {
+    const stop = new AbortController();
+    let ended = 0;
+    const count = () => {
+      ended += 1;
+    };
+    const run = sliced.run({ signal: stop.signal, budgetMs: 1e-6, onStep: count });
+    for (let slice = 0; slice < 2 * round; slice++) await new Promise((resolve) => setImmediate(resolve));
+    stop.abort('enough');
+    await expect(run).rejects.toBe('enough');
+    if (ended === 0) withinFrames += 1;
+    else whole.step(ended);
+    expectSame();
+    expect(sliced.mesh.arrays()).toEqual(whole.mesh.arrays());
+    const { times: _, ...report } = await sliced.run({ maxIterations: 1, budgetMs: 1e-6 });
+    const { times: __, ...expected } = whole.step();
+    expect(report).toEqual(expected);
+    expectSame();
+  }
+  expect(withinFrames).toBeGreaterThan(1);
+  // What is asked in the middle of a frame ends it first.
+  const frames: number[] = [];
+  const run = sliced.run({ maxIterations: 2, budgetMs: 1e-6, onStep: ({ iteration }) => frames.push(iteration) });
+  await new Promise((resolve) => setImmediate(resolve));
+  whole.step();
+  expect(sliced.baseMesh.arrays()).toEqual(whole.baseMesh.arrays());
+  for (const one of [whole, sliced]) one.setEllipsoids([ball(1, 0.3), ball(-0.4, 0.3)]);
+  await run;
+  whole.step();
+  expect(frames.length).toBe(2);
+  expectSame();
+  const freed = sliced.run({ budgetMs: 1e-6 });
+  await new Promise((resolve) => setImmediate(resolve));
+  models.splice(models.indexOf(sliced), 1);
+  sliced.free();
+  expect((await rejection(freed)).code).toBe('freed');
+});
+
 test('invalid arguments are refused by name', async () => {
   const code = (work: () => unknown) => failure(work).code;
   const message = (work: () => unknown) => failure(work).message;

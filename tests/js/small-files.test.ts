@@ -5,7 +5,7 @@ import startReaders, { parseVolume } from '../../pkg/import/index.js';
 import { DeformableModel, LabelSurfaces, Mesh, SurfaceTracker, Volume } from '../../pkg/index.js';
 import { readTiff } from '../../pkg/tiff/index.js';
 import { openZarr } from '../../pkg/zarr/index.js';
-import { ball, failure, HEALTHY, rejection } from './helpers.js';
+import { ball, failure, HEALTHY, rejection, wrong } from './helpers.js';
 import { dataStart, tiffOf } from './made-tiff.js';
 import { TestStore } from './zarr-stores.js';
 
@@ -220,4 +220,19 @@ test('a small file with a slope is not written as many times its voxels', () => 
   const small = Volume.parse(plain);
   expect(small.toBytes('mha').length).toBeGreaterThan(32);
   small.free();
+});
+
+test('an image of a small file is resampled to fifty million voxels at most, any other to as many as there is memory for', () => {
+  const [small, large] = [nrrd('gzip'), nrrd('raw')].map((bytes) => Volume.parse(bytes)) as [Volume, Volume];
+  for (const grid of [{ dims: [369, 369, 369] }, { spacing: [0.28, 0.28, 0.28] }, { like: large }] as const) {
+    const resample = (volume: Volume) => volume.resample(wrong(grid), 'nearest');
+    if ('like' in grid) expect(resample(small).dims).toEqual([SIZE, SIZE, SIZE]);
+    else
+      expect(failure(() => resample(small))).toMatchObject({
+        code: 'too-large',
+        message: expect.stringMatching(/needs 5\d{7} bytes/),
+      });
+  }
+  expect(small.resample({ dims: [300, 300, 300] }, 'nearest').dims).toEqual([300, 300, 300]);
+  expect(large.resample({ dims: [369, 369, 369] }, 'nearest').dims).toEqual([369, 369, 369]);
 });
