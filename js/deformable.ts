@@ -22,9 +22,9 @@ import {
   checkedSlices,
   checkListener,
   checkSignal,
-  Runner,
   type RunOptions,
   runInSlices,
+  SlicedRunner,
   type SliceOptions,
   type Stepper,
   type StepReport,
@@ -214,7 +214,7 @@ export class DeformableModel implements Stepper {
   readonly #mesh: Mesh;
   readonly #volume: Handle<RawVolume> | undefined;
   readonly #sparse: SparseParts | undefined;
-  readonly #runner = new Runner();
+  readonly #runner: SlicedRunner<RawDeformable, Stepped>;
   readonly #warnings: ModelWarnings;
   /** Whether the surface may have few vertices only, as no more has been read of a large volume than a small file has. */
   #isBounded: boolean;
@@ -245,6 +245,7 @@ export class DeformableModel implements Stepper {
       const make = dense(this.#volume, options, (...of) => new RawDeformable(...of));
       this.#handle = new Handle('DeformableModel', make);
     }
+    this.#runner = new SlicedRunner(this.#handle, (report) => this.#taken(report));
     this.#isBounded = source !== undefined && options.maxVertices === undefined;
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     const start = options.start instanceof Mesh ? options.start.warnings : [];
@@ -305,7 +306,7 @@ export class DeformableModel implements Stepper {
 
   /** Current pyramid level: 0 is the volume itself, higher levels are coarser. */
   get level(): number {
-    return this.#use((raw) => raw.level());
+    return this.#runner.use((raw) => raw.level());
   }
 
   /**
@@ -314,12 +315,12 @@ export class DeformableModel implements Stepper {
    * more than twice as long as wide count as several.
    */
   get delta(): number {
-    return this.#use((raw) => raw.delta());
+    return this.#runner.use((raw) => raw.delta());
   }
 
   /** Current values of all parameters; a copy. */
   get params(): Required<DeformableParams> {
-    return this.#use((raw) => raw.params() as Required<DeformableParams>);
+    return this.#runner.use((raw) => raw.params() as Required<DeformableParams>);
   }
 
   /**
@@ -329,7 +330,7 @@ export class DeformableModel implements Stepper {
    */
   setAttractors(attractors: Attractor[]): void {
     const packed = denseCopy('attractors', attractors).flatMap((attractor, index) => numbersOf(attractor, index));
-    this.#use((raw) => raw.setAttractors(Float64Array.from(packed)));
+    this.#runner.use((raw) => raw.setAttractors(Float64Array.from(packed)));
   }
 
   /**
@@ -360,33 +361,7 @@ export class DeformableModel implements Stepper {
   async run(given?: DeformableRunOptions): Promise<StepReport> {
     const { onData, ...run } = checkProperties<DeformableRunOptions>('options', given, RUN_OPTIONS);
     checkListener('onData', onData);
-    return this.#runner.run(
-      () => this.#advance(),
-      run,
-      onData,
-      () => this.#discard(),
-    );
-  }
-
-  /** Gives up the step that is under way: of it, nothing stays. Returns the report of one that has ended. */
-  #discard(): StepReport | undefined {
-    const report = this.#handle.isFreed ? undefined : this.#handle.use((raw) => raw.discard() as Stepped | undefined);
-    return report && this.#taken(report);
-  }
-
-  /** Calls `work` with the model, once a step of a run that is under way has ended and is reported. */
-  #use<T>(work: (raw: RawDeformable) => T): T {
-    this.#runner.settle(() => {
-      const report = this.#handle.use((raw) => raw.settle() as Stepped | undefined);
-      return report && this.#taken(report);
-    });
-    return this.#handle.use(work);
-  }
-
-  /** Does a slice of a step; returns its report at its end. */
-  #advance(): StepReport | undefined {
-    const report = this.#handle.use((raw) => raw.advance() as Stepped | undefined);
-    return report && this.#taken(report);
+    return this.#runner.run(run, onData);
   }
 
   #step(iterations: number): StepReport {
@@ -443,7 +418,7 @@ export class DeformableModel implements Stepper {
     const [first, sizes] = checkedRegion(region);
     const volume = this.#volume;
     if (!volume) throw invalid('refresh', 'not possible with a volume larger than memory');
-    this.#use((raw) => volume.use((voxels) => raw.refresh(voxels, first, sizes)));
+    this.#runner.use((raw) => volume.use((voxels) => raw.refresh(voxels, first, sizes)));
   }
 
   /**
@@ -456,7 +431,7 @@ export class DeformableModel implements Stepper {
   async coverage(given?: CoverageOptions): Promise<Coverage> {
     const { signal, onProgress } = checkedCoverage(given);
     signal?.throwIfAborted();
-    const survey = this.#use((raw) => new Handle('survey', () => raw.surveyCoverage()));
+    const survey = this.#runner.use((raw) => new Handle('survey', () => raw.surveyCoverage()));
     let told = 0;
     const advance = () => {
       // The survey has its own copy of the surface, but freeing the model must still end it.
@@ -486,7 +461,7 @@ export class DeformableModel implements Stepper {
    */
   setParams(params: DeformableParams): void {
     const values = shallowCopy('params', params);
-    this.#use((raw) => raw.setParams(values));
+    this.#runner.use((raw) => raw.setParams(values));
   }
 
   /**
@@ -495,7 +470,7 @@ export class DeformableModel implements Stepper {
    * have 0.
    */
   speeds(): Float32Array {
-    return this.#use((raw) => raw.speeds());
+    return this.#runner.use((raw) => raw.speeds());
   }
 
   /**
@@ -503,7 +478,7 @@ export class DeformableModel implements Stepper {
    * of levels. Of a {@link LargeVolume}, what has been read is not saved: the next step asks for it again.
    */
   save(): Bytes {
-    return this.#use((raw) => raw.save() as Bytes);
+    return this.#runner.use((raw) => raw.save() as Bytes);
   }
 
   /**
@@ -515,7 +490,7 @@ export class DeformableModel implements Stepper {
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
-    this.#use((raw) => raw.restore(state));
+    this.#runner.use((raw) => raw.restore(state));
     this.#warnings.forget();
   }
 

@@ -5,9 +5,9 @@ import { frameOf, type MeshFrame } from './mesh-file.js';
 import { Handle } from './runtime.js';
 import {
   checkedSlices,
-  Runner,
   type RunOptions,
   runInSlices,
+  SlicedRunner,
   type SliceOptions,
   type Stepper,
   type StepReport,
@@ -127,7 +127,7 @@ export class MultiresolutionModel implements Stepper {
   readonly #handle: Handle<RawMultires>;
   readonly #meshHandles: Handle<import('./vesicle.js').RawMesh>[];
   readonly #meshes: Mesh[];
-  readonly #runner = new Runner();
+  readonly #runner: SlicedRunner<RawMultires, StepReport>;
   readonly #warnings: ModelWarnings;
   readonly #frame: MeshFrame;
 
@@ -145,6 +145,7 @@ export class MultiresolutionModel implements Stepper {
     this.#handle = created.handle;
     this.#meshHandles = [0, 1, 2].map((which) => new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh(which))));
     this.#warnings = created.warnings;
+    this.#runner = new SlicedRunner(this.#handle, (report) => this.#warnings.take(report));
     this.#frame = created.frame;
     this.#meshes = this.#meshHandles.map((handle) => wrapMesh(handle, true, () => this.#warnings.of(), this.#frame));
   }
@@ -192,7 +193,7 @@ export class MultiresolutionModel implements Stepper {
 
   /** Current values of all parameters; a copy. */
   get params(): Required<MultiresParams> {
-    return this.#use((raw) => raw.params() as Required<MultiresParams>);
+    return this.#runner.use((raw) => raw.params() as Required<MultiresParams>);
   }
 
   /**
@@ -200,12 +201,12 @@ export class MultiresolutionModel implements Stepper {
    * still shrinking come last.
    */
   get ellipsoids(): ControlEllipsoid[] {
-    return unpackedEllipsoids(this.#use((raw) => raw.ellipsoids()));
+    return unpackedEllipsoids(this.#runner.use((raw) => raw.ellipsoids()));
   }
 
   /** Copy of the targets of the control ellipsoids, as set by {@link MultiresolutionModel.setEllipsoids}. */
   get targets(): ControlEllipsoid[] {
-    return unpackedEllipsoids(this.#use((raw) => raw.targets()));
+    return unpackedEllipsoids(this.#runner.use((raw) => raw.targets()));
   }
 
   /** Number of surfaces in the multiresolution decomposition, from the base to the detail, both included. */
@@ -239,7 +240,7 @@ export class MultiresolutionModel implements Stepper {
   }
 
   #counts(): Counts {
-    return this.#use((raw) => raw.counts() as Counts);
+    return this.#runner.use((raw) => raw.counts() as Counts);
   }
 
   /**
@@ -253,7 +254,7 @@ export class MultiresolutionModel implements Stepper {
    */
   setEllipsoids(ellipsoids: ControlEllipsoid[]): void {
     const packed = packedEllipsoids(ellipsoids);
-    this.#use((raw) => raw.setEllipsoids(packed));
+    this.#runner.use((raw) => raw.setEllipsoids(packed));
   }
 
   /**
@@ -280,39 +281,11 @@ export class MultiresolutionModel implements Stepper {
    *   thrown by `onStep`.
    */
   run(given?: RunOptions): Promise<StepReport> {
-    return this.#runner.run(
-      () => this.#advance(),
-      given,
-      undefined,
-      () => this.#discard(),
-    );
-  }
-
-  /** Does a slice of a step; returns its report at its end. */
-  #advance(): StepReport | undefined {
-    const report = this.#handle.use((raw) => raw.advance() as StepReport | undefined);
-    return report && this.#warnings.take(report);
-  }
-
-  /** Gives up the step that is under way: of it, nothing stays. Returns the report of one that has ended. */
-  #discard(): StepReport | undefined {
-    const report = this.#handle.isFreed
-      ? undefined
-      : this.#handle.use((raw) => raw.discard() as StepReport | undefined);
-    return report && this.#warnings.take(report);
-  }
-
-  /** Calls `work` with the model, once a step of a run that is under way has ended and is reported. */
-  #use<T>(work: (raw: RawMultires) => T): T {
-    this.#runner.settle(() => {
-      const report = this.#handle.use((raw) => raw.settle() as StepReport | undefined);
-      return report && this.#warnings.take(report);
-    });
-    return this.#handle.use(work);
+    return this.#runner.run(given);
   }
 
   #step(iterations: number): StepReport {
-    return this.#warnings.take(this.#use((raw) => raw.step(iterations) as StepReport));
+    return this.#warnings.take(this.#runner.use((raw) => raw.step(iterations) as StepReport));
   }
 
   /**
@@ -321,7 +294,7 @@ export class MultiresolutionModel implements Stepper {
    * to the smallest stretch over all directions, at most 1000, 1 where angles are preserved.
    */
   distortion(): { area: Float32Array; angle: Float32Array } {
-    return this.#use((raw) => ({ area: raw.distortion(0), angle: raw.distortion(1) }));
+    return this.#runner.use((raw) => ({ area: raw.distortion(0), angle: raw.distortion(1) }));
   }
 
   /**
@@ -329,7 +302,7 @@ export class MultiresolutionModel implements Stepper {
    * multi-level solver, from coarse to fine, to show how it works.
    */
   levelMeshes(): Mesh[] {
-    const levels = this.#use((raw) => raw.levelMeshes());
+    const levels = this.#runner.use((raw) => raw.levelMeshes());
     const warnings = this.#warnings.of();
     return levels.map((level) => wrapMesh(new Handle('Mesh', () => level), false, () => warnings, this.#frame));
   }
@@ -341,7 +314,7 @@ export class MultiresolutionModel implements Stepper {
    */
   setParams(params: MultiresParams): void {
     const values = shallowCopy('params', params);
-    this.#use((raw) => raw.setParams(values));
+    this.#runner.use((raw) => raw.setParams(values));
   }
 
   /**
@@ -349,7 +322,7 @@ export class MultiresolutionModel implements Stepper {
    * ellipsoids.
    */
   save(): Bytes {
-    return this.#use((raw) => raw.save() as Bytes);
+    return this.#runner.use((raw) => raw.save() as Bytes);
   }
 
   /**
@@ -361,7 +334,7 @@ export class MultiresolutionModel implements Stepper {
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
-    this.#use((raw) => raw.restore(state));
+    this.#runner.use((raw) => raw.restore(state));
     this.#warnings.forget();
   }
 

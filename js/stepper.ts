@@ -2,6 +2,7 @@ import { checkProperties, integer, invalid, positive } from './check.js';
 import type { DataOptions } from './data.js';
 import { NeedsDataError } from './error.js';
 import type { Mesh } from './mesh.js';
+import type { Handle } from './runtime.js';
 import type { Warning } from './warning.js';
 
 /** State of a model after one step, or several together, and the events during them. */
@@ -236,6 +237,53 @@ export class Runner {
       this.#running = false;
       this.#take = undefined;
     }
+  }
+}
+
+/** A raw model whose steps go in slices. */
+interface SlicedSteps {
+  advance(): unknown;
+  settle(): unknown;
+  discard(): unknown;
+  free(): void;
+}
+
+/**
+ * Runs of a model whose steps go in slices. Whatever is asked of the model meanwhile, by {@link use}, ends the step that is
+ * under way first. `taken` makes a report of what the raw model returns at the end of a step.
+ */
+export class SlicedRunner<Raw extends SlicedSteps, Stepped> {
+  readonly #runner = new Runner();
+  readonly #handle: Handle<Raw>;
+  readonly #taken: (report: Stepped) => StepReport;
+
+  constructor(handle: Handle<Raw>, taken: (report: Stepped) => StepReport) {
+    [this.#handle, this.#taken] = [handle, taken];
+  }
+
+  /** As {@link Runner.refuseWhileRunning}. */
+  refuseWhileRunning(what: string): void {
+    this.#runner.refuseWhileRunning(what);
+  }
+
+  /** Calls `work` with the raw model, once a step of a run that is under way has ended and is reported. */
+  use<T>(work: (raw: Raw) => T): T {
+    this.#runner.settle(() => this.#ended((raw) => raw.settle()));
+    return this.#handle.use(work);
+  }
+
+  /** As {@link Runner.run}. */
+  run(given: RunOptions | undefined, onData?: DataOptions['onData']): Promise<StepReport> {
+    const advance = () => this.#ended((raw) => raw.advance());
+    // Of a step that is given up, nothing stays.
+    const discard = () => (this.#handle.isFreed ? undefined : this.#ended((raw) => raw.discard()));
+    return this.#runner.run(advance, given, onData, discard);
+  }
+
+  /** Returns the report of a step that has ended, if one has. */
+  #ended(work: (raw: Raw) => unknown): StepReport | undefined {
+    const report = this.#handle.use(work) as Stepped | undefined;
+    return report && this.#taken(report);
   }
 }
 

@@ -6,9 +6,9 @@ import { Handle } from './runtime.js';
 import { isOfSmall, limitOf, MOST_TRACKED_OF_SMALL, MOST_VOXELS_OF_SMALL } from './small-files.js';
 import {
   checkedSlices,
-  Runner,
   type RunOptions,
   runInSlices,
+  SlicedRunner,
   type SliceOptions,
   type Stepper,
   type StepReport,
@@ -196,7 +196,7 @@ export class SurfaceTracker implements Stepper {
   readonly #handle: Handle<RawTracker>;
   readonly #meshHandle: Handle<import('./vesicle.js').RawMesh>;
   readonly #mesh: Mesh;
-  readonly #runner = new Runner();
+  readonly #runner: SlicedRunner<RawTracker, StepReport>;
   readonly #warnings: ModelWarnings;
   readonly #frame: MeshFrame;
   readonly #frameSeconds: number;
@@ -217,6 +217,7 @@ export class SurfaceTracker implements Stepper {
     this.#frameSeconds = volumeHandle('volume', known.volume).use((raw) => raw.frameSeconds()) || FRAME_SECONDS;
     const make = () => beginning(known, (of) => new RawTracker(of));
     this.#handle = created ? created.handle : new Handle('SurfaceTracker', make());
+    this.#runner = new SlicedRunner(this.#handle, (report) => this.#warnings.take(report));
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     this.#warnings = new ModelWarnings(known.volume.warnings, known.start?.warnings);
     this.#frame = frameOf(known.volume);
@@ -285,7 +286,7 @@ export class SurfaceTracker implements Stepper {
 
   /** Index of the frame shown by {@link SurfaceTracker.mesh}, from 0; also 0 before the first frame is done. */
   get frame(): number {
-    return this.#use((raw) => raw.frame());
+    return this.#runner.use((raw) => raw.frame());
   }
 
   /**
@@ -325,15 +326,15 @@ export class SurfaceTracker implements Stepper {
 
   /** Current values of all parameters; a copy. */
   get params(): Required<TrackingParams> {
-    return this.#use((raw) => raw.params() as Required<TrackingParams>);
+    return this.#runner.use((raw) => raw.params() as Required<TrackingParams>);
   }
 
   #statistics(): Statistics {
-    return this.#use((raw) => raw.statistics() as Statistics);
+    return this.#runner.use((raw) => raw.statistics() as Statistics);
   }
 
   #counts(): [number, number, number] {
-    return [...this.#use((raw) => raw.counts())] as [number, number, number];
+    return [...this.#runner.use((raw) => raw.counts())] as [number, number, number];
   }
 
   /**
@@ -360,35 +361,7 @@ export class SurfaceTracker implements Stepper {
    *   and stays usable; any error thrown by `onStep`.
    */
   async run(given?: RunOptions): Promise<StepReport> {
-    return this.#runner.run(
-      () => this.#advance(),
-      given,
-      undefined,
-      () => this.#discard(),
-    );
-  }
-
-  /** Does a slice of a step; returns its report at its end. */
-  #advance(): StepReport | undefined {
-    const report = this.#handle.use((raw) => raw.advance() as StepReport | undefined);
-    return report && this.#warnings.take(report);
-  }
-
-  /** Gives up the step that is under way: of it, nothing stays. Returns the report of one that has ended. */
-  #discard(): StepReport | undefined {
-    const report = this.#handle.isFreed
-      ? undefined
-      : this.#handle.use((raw) => raw.discard() as StepReport | undefined);
-    return report && this.#warnings.take(report);
-  }
-
-  /** Calls `work` with the tracker, once a step of a run that is under way has ended and is reported. */
-  #use<T>(work: (raw: RawTracker) => T): T {
-    this.#runner.settle(() => {
-      const report = this.#handle.use((raw) => raw.settle() as StepReport | undefined);
-      return report && this.#warnings.take(report);
-    });
-    return this.#handle.use(work);
+    return this.#runner.run(given);
   }
 
   #step(iterations: number): StepReport {
@@ -403,7 +376,7 @@ export class SurfaceTracker implements Stepper {
    */
   setParams(params: TrackingParams): void {
     const values = shallowCopy('params', params);
-    this.#use((raw) => raw.setParams(values));
+    this.#runner.use((raw) => raw.setParams(values));
   }
 
   /**
@@ -418,7 +391,7 @@ export class SurfaceTracker implements Stepper {
   boundary(frame?: number): Float32Array {
     const [frames, bounded] = this.#counts();
     const at = frame === undefined ? Math.max(bounded - 1, 0) : integer('frame', frame, { max: frames - 1 });
-    return this.#use((raw) => raw.boundary(at));
+    return this.#runner.use((raw) => raw.boundary(at));
   }
 
   /**
@@ -433,7 +406,7 @@ export class SurfaceTracker implements Stepper {
     }
     const warnings = this.#warnings.of({ frame });
     return wrapMesh(
-      new Handle('Mesh', () => this.#use((raw) => raw.meshAt(frame) as import('./vesicle.js').RawMesh)),
+      new Handle('Mesh', () => this.#runner.use((raw) => raw.meshAt(frame) as import('./vesicle.js').RawMesh)),
       false,
       () => warnings,
       this.#frame,
@@ -442,7 +415,7 @@ export class SurfaceTracker implements Stepper {
 
   /** Returns the enclosed volume of each frame tracked so far, world units cubed; 0 for those without the object. */
   volumes(): Float64Array {
-    return this.#use((raw) => raw.volumes());
+    return this.#runner.use((raw) => raw.volumes());
   }
 
   /**
@@ -455,7 +428,7 @@ export class SurfaceTracker implements Stepper {
   toGlb(options?: SpaceOptions): Bytes {
     const frame = checkedSpaceOptions(checkProperties('options', options, SPACE_OPTIONS), this.#frame, true);
     const seconds = Math.min(Math.max(this.#frameSeconds, 0.001), 1000);
-    return this.#use((raw) => raw.toGlb(seconds, notesOf(this.#warnings.of()), ...frame) as Bytes);
+    return this.#runner.use((raw) => raw.toGlb(seconds, notesOf(this.#warnings.of()), ...frame) as Bytes);
   }
 
   /**
@@ -463,7 +436,7 @@ export class SurfaceTracker implements Stepper {
    * component, cavity and start.
    */
   save(): Bytes {
-    return this.#use((raw) => raw.save() as Bytes);
+    return this.#runner.use((raw) => raw.save() as Bytes);
   }
 
   /**
@@ -475,7 +448,7 @@ export class SurfaceTracker implements Stepper {
   restore(state: Uint8Array): void {
     typedArray('state', state, Uint8Array);
     this.#runner.refuseWhileRunning('restore');
-    this.#use((raw) => raw.restore(state));
+    this.#runner.use((raw) => raw.restore(state));
     this.#warnings.forget();
   }
 
