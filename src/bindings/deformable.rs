@@ -12,14 +12,14 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::{doubles, to_js, with_overrides, world_points};
 use super::error::Failure;
 use super::mesh::RawMesh;
-use super::method::{method_bindings, reported};
-use super::stepping::{LiveStepping, Sliced, Stepping};
+use super::method::method_bindings;
+use super::stepping::{LiveStepping, Stepping, sliced_bindings};
 use super::volume::RawVolume;
 use vesicle::math::DVec3;
+use vesicle::methods::MethodError;
 use vesicle::methods::deformable::{
     Attractor, Coverage, CoverageSurvey, DeformableModel, DeformableOptions, DeformableParams, Missing, Start,
 };
-use vesicle::methods::{MethodError, StepReport};
 use vesicle::pauses::{Computation, advance};
 
 /// The raw handle of a start surface, from which a deformable model begins.
@@ -66,16 +66,6 @@ impl RawStart {
 /// The raw handle of the TypeScript class `DeformableModel`, which shares the model with the live mesh of its surface.
 #[wasm_bindgen]
 pub struct RawDeformable(pub(super) Rc<Stepping<DeformableModel>>);
-
-impl Sliced for DeformableModel {
-    fn step_in_slices(&mut self) -> impl Future<Output = Result<StepReport, MethodError>> {
-        self.step_in_slices()
-    }
-
-    fn discard_step(&mut self) {
-        self.discard_step();
-    }
-}
 
 impl RawDeformable {
     pub(super) fn ready(&self) -> RefMut<'_, DeformableModel> {
@@ -136,6 +126,7 @@ impl RawDeformableCreation {
     }
 }
 
+sliced_bindings!(RawDeformable, DeformableModel);
 method_bindings!(RawDeformable, DeformableModel, deformableParamSpecs);
 
 #[wasm_bindgen]
@@ -157,21 +148,6 @@ impl RawDeformable {
     #[wasm_bindgen(js_name = maxLevels)]
     pub fn max_levels(volume: &RawVolume) -> usize {
         DeformableModel::max_levels(&volume.0)
-    }
-
-    /// Does a slice of a step; returns what `step` returns at its end, else undefined.
-    pub fn advance(&self) -> Result<JsValue, JsValue> {
-        self.0.advance().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(report)?))
-    }
-
-    /// Ends the step that is under way; returns the report of a step that has ended since the last slice, else undefined.
-    pub fn settle(&self) -> Result<JsValue, JsValue> {
-        self.0.settle().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(report)?))
-    }
-
-    /// Gives up the step that is under way; returns the report of one that has ended since the last slice, else undefined.
-    pub fn discard(&self) -> Result<JsValue, JsValue> {
-        self.0.discard().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(Ok(report))?))
     }
 
     /// Returns the surface as a live mesh, which changes with the model.

@@ -12,14 +12,14 @@ use wasm_bindgen::prelude::{JsValue, wasm_bindgen};
 use super::convert::{doubles, to_js, with_overrides};
 use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
-use super::method::{method_bindings, reported};
-use super::stepping::{LiveStepping, Sliced, Stepping};
+use super::method::method_bindings;
+use super::stepping::{LiveStepping, Stepping, sliced_bindings};
 use vesicle::math::DVec3;
 use vesicle::mesh::TriangleMesh;
 use vesicle::methods::multires::{
     ControlEllipsoid, MultiresOptions, MultiresParams, MultiresolutionModel, Support,
 };
-use vesicle::methods::{LiveSurface, MethodError, StepReport};
+use vesicle::methods::{LiveSurface, MethodError};
 use vesicle::pauses::{Computation, advance};
 
 /// Returns the options of a model; properties of `params` replace the default parameters.
@@ -72,22 +72,13 @@ impl RawMultiresCreation {
 #[wasm_bindgen]
 pub struct RawMultires(Rc<Stepping<MultiresolutionModel>>);
 
-impl Sliced for MultiresolutionModel {
-    fn step_in_slices(&mut self) -> impl Future<Output = Result<StepReport, MethodError>> {
-        self.step_in_slices()
-    }
-
-    fn discard_step(&mut self) {
-        self.discard_step();
-    }
-}
-
 impl RawMultires {
     fn ready(&self) -> RefMut<'_, MultiresolutionModel> {
         self.0.ready()
     }
 }
 
+sliced_bindings!(RawMultires, MultiresolutionModel);
 method_bindings!(RawMultires, MultiresolutionModel, multiresParamSpecs);
 
 /// A surface of a multiresolution model besides the detailed one, as the content of a live mesh: the deformed base, or the
@@ -133,21 +124,6 @@ impl RawMultires {
     ) -> Result<RawMultires, JsValue> {
         let options = options(detail, base, ellipsoids, params, holds_itself)?;
         Ok(RawMultires(Stepping::new(MultiresolutionModel::new(options).map_err(Failure::from)?)))
-    }
-
-    /// Does a slice of a step; returns what `step` returns at its end, else undefined.
-    pub fn advance(&self) -> Result<JsValue, JsValue> {
-        self.0.advance().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(report)?))
-    }
-
-    /// Ends the step that is under way; returns the report of a step that has ended since the last slice, else undefined.
-    pub fn settle(&self) -> Result<JsValue, JsValue> {
-        self.0.settle().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(report)?))
-    }
-
-    /// Gives up the step that is under way; returns the report of one that has ended since the last slice, else undefined.
-    pub fn discard(&self) -> Result<JsValue, JsValue> {
-        self.0.discard().map_or(Ok(JsValue::UNDEFINED), |report| Ok(reported(Ok(report))?))
     }
 
     /// Returns a live mesh of the model: the detailed surface (0), the deformed base (1) or the link mesh (2).

@@ -109,3 +109,46 @@ impl<M: Sliced> LiveSurface for LiveStepping<M> {
         self.0.ready().versions()
     }
 }
+
+/// Implements [`Sliced`] for a method that has its functions, and binds the slices of steps of its raw handle, which has a
+/// [`Stepping`].
+macro_rules! sliced_bindings {
+    ($Raw:ident, $Model:ident) => {
+        impl $crate::stepping::Sliced for $Model {
+            fn step_in_slices(
+                &mut self,
+            ) -> impl Future<Output = Result<vesicle::methods::StepReport, vesicle::methods::MethodError>>
+            {
+                self.step_in_slices()
+            }
+
+            fn discard_step(&mut self) {
+                self.discard_step();
+            }
+        }
+
+        #[wasm_bindgen]
+        impl $Raw {
+            /// Does a slice of a step; returns what `step` returns at its end, else undefined.
+            pub fn advance(&self) -> Result<JsValue, JsValue> {
+                self.0
+                    .advance()
+                    .map_or(Ok(JsValue::UNDEFINED), |report| Ok($crate::method::reported(report)?))
+            }
+
+            /// Ends the step that is under way; returns the report of a step that has ended since the last slice, else undefined.
+            pub fn settle(&self) -> Result<JsValue, JsValue> {
+                self.0.settle().map_or(Ok(JsValue::UNDEFINED), |report| Ok($crate::method::reported(report)?))
+            }
+
+            /// Gives up the step that is under way; returns the report of one that has ended since the last slice, else undefined.
+            pub fn discard(&self) -> Result<JsValue, JsValue> {
+                self.0
+                    .discard()
+                    .map_or(Ok(JsValue::UNDEFINED), |report| Ok($crate::method::reported(Ok(report))?))
+            }
+        }
+    };
+}
+
+pub(super) use sliced_bindings;

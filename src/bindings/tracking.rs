@@ -13,7 +13,7 @@ use super::convert::{bytes, doubles, to_js, with_overrides, write_options};
 use super::error::Failure;
 use super::mesh::{RawMesh, TriangleCopy, triangle_list};
 use super::method;
-use super::stepping::{LiveStepping, Sliced, Stepping};
+use super::stepping::{LiveStepping, Stepping, sliced_bindings};
 use super::volume::RawVolume;
 use vesicle::io::AnimationWriter;
 use vesicle::math::DVec3;
@@ -21,18 +21,8 @@ use vesicle::methods::tracking::{
     Bounds, Cavity, Component, FrameStatistics, Proposal, Query, SurfaceTracker, TrackingLimits,
     TrackingOptions, TrackingParams,
 };
-use vesicle::methods::{Method, MethodError, StepReport};
+use vesicle::methods::{Method, MethodError};
 use vesicle::pauses::{Computation, advance};
-
-impl Sliced for SurfaceTracker {
-    fn step_in_slices(&mut self) -> impl Future<Output = Result<StepReport, MethodError>> {
-        self.step_in_slices()
-    }
-
-    fn discard_step(&mut self) {
-        self.discard_step();
-    }
-}
 
 /// Options of a tracker that are being proposed in slices.
 #[wasm_bindgen]
@@ -176,6 +166,8 @@ impl RawTrackerCreation {
 #[wasm_bindgen]
 pub struct RawTracker(Rc<Stepping<SurfaceTracker>>);
 
+sliced_bindings!(RawTracker, SurfaceTracker);
+
 #[wasm_bindgen]
 impl RawTracker {
     /// Creates a tracker of a surface through the frames of a 4D volume.
@@ -190,23 +182,6 @@ impl RawTracker {
     pub fn step(&self, iterations: u32) -> Result<JsValue, JsValue> {
         let report = self.0.ready().steps(iterations).map_err(Failure::from)?;
         Ok(to_js(&report)?)
-    }
-
-    /// Does a slice of a step; returns its `StepReport` at its end, else undefined.
-    pub fn advance(&self) -> Result<JsValue, JsValue> {
-        let report = self.0.advance().transpose().map_err(Failure::from)?;
-        report.map_or(Ok(JsValue::UNDEFINED), |report| Ok(to_js(&report)?))
-    }
-
-    /// Ends the step that is under way; returns the report of a step that has ended since the last slice, else undefined.
-    pub fn settle(&self) -> Result<JsValue, JsValue> {
-        let report = self.0.settle().transpose().map_err(Failure::from)?;
-        report.map_or(Ok(JsValue::UNDEFINED), |report| Ok(to_js(&report)?))
-    }
-
-    /// Gives up the step that is under way; returns the report of one that has ended since the last slice, else undefined.
-    pub fn discard(&self) -> Result<JsValue, JsValue> {
-        self.0.discard().map_or(Ok(JsValue::UNDEFINED), |report| Ok(to_js(&report)?))
     }
 
     /// Returns the current values of all parameters, as a plain object.

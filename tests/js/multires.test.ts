@@ -205,7 +205,7 @@ test('a run yields within frames of a surface that holds itself: an abort leaves
     expectSame();
   }
   expect(withinFrames).toBeGreaterThan(1);
-  // What is asked in the middle of a frame ends it first.
+  // A question in the middle of a frame ends it first.
   const frames: number[] = [];
   const run = sliced.run({ maxIterations: 2, budgetMs: 1e-6, onStep: ({ iteration }) => frames.push(iteration) });
   await new Promise((resolve) => setImmediate(resolve));

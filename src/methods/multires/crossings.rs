@@ -45,7 +45,7 @@ impl Crossings {
     pub fn warning(&self) -> Option<Warning> {
         self.any().then(|| {
             let what = if self.pairs.is_none() {
-                "So many triangles of the surface overlap that it is not known whether it intersects itself as given: it is not \
+                "Too many triangles of the surface overlap to find whether it intersects itself as given: it is not \
                  kept from doing so. Remesh it before, if that matters."
             } else {
                 "The surface intersects itself as given. Its components that do, with themselves or each other, are \
