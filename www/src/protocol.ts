@@ -57,6 +57,8 @@ export interface NamedBytes {
   name: string;
   bytes: Uint8Array;
   notes?: FileNotes;
+  /** Whether it was written from files of another program that are small, all together, however large it is itself. */
+  isOfSmall?: boolean;
 }
 
 /** Initial surface of the deformable model. Lengths and positions are in world coordinates. */

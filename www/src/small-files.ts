@@ -34,5 +34,9 @@ export function beyondSmall(key: TextKey, count: number, most: number, more: Rec
 
 /** Returns whether files are small, all together. */
 export function areSmall(files: readonly (Blob | NamedBytes)[]): boolean {
-  return files.reduce((sum, file) => sum + (file instanceof Blob ? file.size : file.bytes.length), 0) <= SMALL;
+  const size = (file: Blob | NamedBytes) => {
+    if (file instanceof Blob) return file.size;
+    return file.isOfSmall ? 0 : file.bytes.length;
+  };
+  return files.reduce((sum, file) => sum + size(file), 0) <= SMALL;
 }

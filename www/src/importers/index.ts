@@ -5,6 +5,7 @@
  */
 import type { FileNotes } from '../protocol';
 import { isNamedSession } from '../session/recognise';
+import { areSmall } from '../small-files';
 import { text } from '../texts';
 import { hasName, setName } from '../ui/folders';
 import { type Chosen, VolumeChoice } from '../ui/volume-choice';
@@ -21,6 +22,12 @@ const notes = new WeakMap<File, FileNotes>();
 
 /** Returns the notes on a file, which it does not contain itself. */
 export const notesOf = (file: File): FileNotes | undefined => notes.get(file);
+
+/** Files that were written here from small ones. */
+const ofSmall = new WeakSet<File>();
+
+/** Returns whether a file was written here from files that are small, all together. */
+export const isOfSmallFiles = (file: File): boolean => ofSmall.has(file);
 
 /** Returns a file with notes. */
 export function noted(file: File, known: FileNotes | undefined): File {
@@ -92,6 +99,7 @@ async function imported(files: File[], foreign: File[], admission: Admission): P
     const read = await choice.during(client.request('read', chosen));
     if (!read) return undefined;
     const opened = read.map(({ name, bytes, notes }) => noted(new File([bytes as BlobPart], name), notes));
+    if (areSmall(files)) for (const file of opened) ofSmall.add(file);
     const titles = listing.candidates.filter(({ id }) => chosen.ids.includes(id)).map(({ title }) => title);
     setName(opened, titles.join(' + '));
     return opened;

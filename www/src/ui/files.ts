@@ -1,4 +1,4 @@
-import { type Admission, admitted, notesOf } from '../importers';
+import { type Admission, admitted, isOfSmallFiles, notesOf } from '../importers';
 import type { NamedBytes } from '../protocol';
 import { areSmall } from '../small-files';
 import { text } from '../texts';
@@ -142,7 +142,9 @@ export function reading(files: File[]): { load: () => Promise<{ files: NamedByte
 
 async function readFile(file: File): Promise<NamedBytes> {
   const notes = notesOf(file);
-  return { name: file.name, bytes: new Uint8Array(await file.arrayBuffer()), ...(notes && { notes }) };
+  const isOfSmall = isOfSmallFiles(file);
+  const bytes = new Uint8Array(await file.arrayBuffer());
+  return { name: file.name, bytes, ...(notes && { notes }), ...(isOfSmall && { isOfSmall }) };
 }
 
 /** Downloads bytes as a file with the given name and media type. */
