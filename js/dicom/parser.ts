@@ -112,10 +112,33 @@ export async function readWhole(parser: Parser, file: Source): Promise<Header> {
   }
 }
 
+/** Where the meta header begins. */
+const META = 132;
+
+/** Reads the meta header. The parser looks at what comes after it, which may be compressed, and like anything. */
+function readMeta(parser: Parser, bytes: Uint8Array, options: { untilTag: string }): DataSet {
+  try {
+    return parser.readPart10Header(bytes, options);
+  } catch (error) {
+    const end = metaEnd(bytes);
+    if (end === undefined) throw error;
+    return parser.readPart10Header(bytes.subarray(0, end), options);
+  }
+}
+
+/** Returns where the meta header ends, by the length that it begins with; undefined if it states none. */
+function metaEnd(bytes: Uint8Array): number | undefined {
+  if (bytes.length < META + 12) return undefined;
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  const isLength = view.getUint32(META, true) === 0x0002 && view.getUint32(META + 4) === 0x554c0400;
+  const end = META + 12 + view.getUint32(META + 8, true);
+  return isLength && end <= bytes.length ? end : undefined;
+}
+
 async function parse(parser: Parser, file: Source, bytes: Uint8Array, options: { untilTag?: string }): Promise<Header> {
   if (!hasPreamble(bytes)) return parseWithout(parser, bytes, options);
   // With a tag that ends it, only the meta header is parsed.
-  const meta = parser.readPart10Header(bytes, options as { untilTag: string });
+  const meta = readMeta(parser, bytes, options as { untilTag: string });
   const transferSyntax = meta.string('x00020010') ?? IMPLICIT;
   if (transferSyntax !== DEFLATED) {
     const given = { ...options, TransferSyntaxUID: transferSyntax };

@@ -155,7 +155,7 @@ function joined(file: Source, { byteArray }: DataSet, fragments: readonly Fragme
 const FREE_VOXELS = 2 ** 24;
 const VOXELS_PER_BYTE = 1000;
 /** The same for JPEG 2000, whose decoder may go through a voxel dozens of times; per byte of images that are not small. */
-const FREE_OF_JPEG_2000 = 2 ** 21;
+const FREE_OF_JPEG_2000 = 1_500_000;
 const OF_JPEG_2000_PER_BYTE = 64;
 /** Most bytes that a byte of RLE can stand for. */
 const RLE_RATIO = 64;
