@@ -20,8 +20,9 @@ const MAX_EDITS: u8 = 40;
 /// The valence above which an edit takes long.
 const WIDE: usize = 128;
 
-/// Number of triangles around vertices that are tested in a unit of work.
-const TESTED_PER_UNIT: usize = 32;
+/// Numbers of triangles around vertices that are tested, and of nearby vertices that are visited, in a unit of work.
+const TESTED_PER_UNIT: u64 = 32;
+const VISITED_PER_UNIT: u64 = 16;
 
 impl Resolver {
     /// Brings the lengths of edges around queued vertices within bounds where possible, until the queue is empty or the
@@ -41,10 +42,11 @@ impl Resolver {
             }
             let mut next = Some(0);
             while let Some(k) = next {
-                let tested = self.embedding.tested_around();
+                let (tested, visited) = (self.embedding.tested_around(), self.embedding.effort());
                 next = self.restore_vertex(mesh, sampling, guide, u, k);
-                let tested = self.embedding.tested_around() - tested;
-                pauses.after(tested as usize / TESTED_PER_UNIT).await;
+                let (tested, visited) =
+                    (self.embedding.tested_around() - tested, self.embedding.effort() - visited);
+                pauses.after((tested / TESTED_PER_UNIT + visited / VISITED_PER_UNIT) as usize).await;
             }
         }
     }

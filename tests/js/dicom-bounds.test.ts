@@ -50,6 +50,16 @@ const file = (elements: Element[], k = 0, uid?: string) => ({
   bytes: new Uint8Array(fileOf(elements, 'explicit', uid)),
 });
 
+/** An image of 512 × 170 voxels, whose compressed bytes have the letters of a sequence in the place of a type. */
+const LIKE_A_SEQUENCE = [
+  '7c3NalNRFAbQL7dFQqkaEaQ4OsM7OpwTK8ZxIjSDNuBtcHIHvomvIz6VjyK5g76DsNaefPsH9jofcj5+TK/burtvtbfWdvVz7fW+',
+  '9trrNuvc5Xy8WS4+1d571vmZ/TRk/1zyOufjq2X3NSVvXrpdSt7nOF2n915KtjlM67S5zb23UvIlh+k2fW5L9bmVMUPO05BVxlxn',
+  'P93m8fR02j98Pz1+25Yxm2X7J2PeLSnDmJbD5cPcy5isLtNNxqxe0rCktxlztaTk769NTj+S/L50AAAAAAAAAAAAAAAAAAAAAAAA',
+  'AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA',
+  'AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA',
+  '8P/6Bw==',
+];
+
 const DEFLATED = '1.2.840.10008.1.2.1.99';
 /** Returns a file whose data set is compressed as a whole. */
 function deflated(elements: Element[]) {
@@ -155,6 +165,12 @@ describe('files of very many', () => {
     expect(reasons(await openDicom(file(image({ more: [nested] }))))[0]).toMatch(/sequences are nested too deeply/);
     const many = sequence('00081140', ...Array.from({ length: 100_000 }, () => []));
     expect(reasons(await within(3, () => openDicom(file(image({ more: [many] })))))[0]).toMatch(/a single image/);
+  });
+
+  test('none, although the first bytes of a compressed data set look like a sequence', async () => {
+    const bytes = Buffer.concat([fileOf([], 'explicit', DEFLATED), Buffer.from(LIKE_A_SEQUENCE.join(''), 'base64')]);
+    const listing = await openDicom({ name: 'deflated', bytes: new Uint8Array(bytes) });
+    expect(reasons(listing)).toEqual([expect.stringMatching(/a single image/)]);
   });
 
   test('items or zeros in a compressed data set', async () => {
