@@ -3,6 +3,7 @@ import { readFile } from 'node:fs/promises';
 import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import { AXIAL, type Elements } from '../js/dicom-files';
+import { deflatedStack } from '../js/made-tiff';
 import { type App, measures, openApp, reach } from './browser';
 import { dicomSeries, type Given, type SeriesName, type Volume } from './pictures';
 
@@ -168,4 +169,22 @@ describe('other files', () => {
     await dialog().getByRole('button', { name: 'Open' }).click();
     await app.page.waitForFunction(() => document.querySelector('.facts')?.textContent?.includes('two.nrrd'));
   });
+});
+
+test('what is decoded from a small file has the bounds of small files', async () => {
+  const side = 120;
+  // Rods of one voxel, whose contour has two triangles for each voxel.
+  const rods = Uint8Array.from({ length: side ** 2 }, (_, i) =>
+    i % 2 === 0 && Math.floor(i / side) % 2 === 0 ? 200 : 0,
+  );
+  const buffer = Buffer.from(
+    deflatedStack(
+      Array.from({ length: side }, () => rods),
+      side,
+    ),
+  );
+  expect(buffer.length).toBeLessThan(1e5);
+  await give([{ name: 'rods.tif', mimeType: 'image/tiff', buffer }]);
+  await expect.poll(() => app.page.textContent('.banner')).toContain('more than 2400000 triangles');
+  await app.page.click('.banner button');
 });

@@ -13,6 +13,9 @@ test('data are small if their files are, all together, or the session that has t
   expect(isOfSmall(undefined, [file(SMALL), file(1)])).toBe(false);
   expect(isOfSmall(undefined, [new Blob([new Uint8Array(SMALL + 1)])])).toBe(false);
   expect(isOfSmall(undefined, undefined)).toBe(false);
+  // Decoded from small files of another program.
+  expect(isOfSmall(undefined, [{ ...file(2 * SMALL), isOfSmall: true }])).toBe(true);
+  expect(isOfSmall(undefined, [{ ...file(2 * SMALL), isOfSmall: true }, file(SMALL + 1)])).toBe(false);
   const session = (content: Uint8Array | undefined, isSmall: boolean) =>
     ({ isSmall, source: { name: 'x', files: [{ name: 'x.nii', sha256: '', content }] } }) as unknown as Session;
   const large = [file(2 * SMALL)];

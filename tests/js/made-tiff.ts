@@ -216,3 +216,29 @@ export function withTagFaults(pages: readonly Entry[][], faults: readonly TagFau
   }
   return found;
 }
+
+/** Returns a TIFF with a page of `side` × `side` bytes for each slice, deflated. */
+export function deflatedStack(slices: readonly Uint8Array[], side: number): Uint8Array {
+  const form = { isBig: false, isLittle: true };
+  const packed = slices.map((slice) => new Uint8Array(deflateSync(slice)));
+  let start = dataStart(form);
+  const pages = packed.map(({ length }) => {
+    const tags: [number, number][] = [
+      ...([
+        [256, side],
+        [257, side],
+        [258, 8],
+        [259, 8],
+        [262, 1],
+      ] as [number, number][]),
+      ...([
+        [273, start],
+        [278, side],
+        [279, length],
+      ] as [number, number][]),
+    ];
+    start += length;
+    return tags.map(([tag, value]) => ({ tag, type: 4, values: [value] }));
+  });
+  return new Uint8Array(tiffOf(packed, pages, form));
+}

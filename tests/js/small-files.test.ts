@@ -1,12 +1,12 @@
 // Models of images in small files, which may come from anyone and stand for a lattice of any size.
-import { deflateSync, gzipSync } from 'node:zlib';
+import { gzipSync } from 'node:zlib';
 import { expect, test } from 'vitest';
 import startReaders, { parseVolume } from '../../pkg/import/index.js';
 import { DeformableModel, LabelSurfaces, Mesh, SurfaceTracker, Volume } from '../../pkg/index.js';
 import { readTiff } from '../../pkg/tiff/index.js';
 import { openZarr } from '../../pkg/zarr/index.js';
 import { ball, failure, HEALTHY, rejection, wrong } from './helpers.js';
-import { dataStart, tiffOf } from './made-tiff.js';
+import { deflatedStack } from './made-tiff.js';
 import { TestStore } from './zarr-stores.js';
 
 const SIZE = 104;
@@ -22,28 +22,11 @@ function nrrd(encoding: 'gzip' | 'raw'): Uint8Array {
   return new Uint8Array(Buffer.concat([Buffer.from(header), encoding === 'gzip' ? gzipSync(rods) : rods]));
 }
 
-function tiff(): Uint8Array {
-  const form = { isBig: false, isLittle: true };
-  const slice = new Uint8Array(deflateSync(rods.subarray(0, SIZE ** 2)));
-  const slices = Array.from({ length: SIZE }, (_, z) => {
-    const tags: [number, number][] = [
-      ...([
-        [256, SIZE],
-        [257, SIZE],
-        [258, 8],
-        [259, 8],
-        [262, 1],
-      ] as [number, number][]),
-      ...([
-        [273, dataStart(form) + z * slice.length],
-        [278, SIZE],
-        [279, slice.length],
-      ] as [number, number][]),
-    ];
-    return tags.map(([tag, value]) => ({ tag, type: 4, values: [value] }));
-  });
-  return new Uint8Array(tiffOf(new Array(SIZE).fill(slice), slices, form));
-}
+const tiff = () =>
+  deflatedStack(
+    Array.from({ length: SIZE }, (_, z) => rods.subarray(z * SIZE ** 2, (z + 1) * SIZE ** 2)),
+    SIZE,
+  );
 
 async function zarr() {
   const json = (value: unknown) => new TextEncoder().encode(JSON.stringify(value));
