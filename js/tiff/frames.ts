@@ -5,7 +5,7 @@ const LS = 0xf7;
 
 /** Marker of a scan, of which an image has some ten at most: decoders go through the whole image for each. */
 const SCAN = 0xda;
-/** Most scans, and most pixels of all of them: so many, or more for each byte. */
+/** Largest number of scans; and of pixels, added up over all scans, of which large files may have this many for each byte. */
 const [MOST_SCANS, MOST_SCANNED, SCANNED_PER_BYTE] = [20, 2 ** 27, 1000];
 
 export interface JpegSize {

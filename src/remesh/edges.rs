@@ -20,8 +20,7 @@ const MAX_EDITS: u8 = 40;
 /// The valence above which an edit takes long.
 const WIDE: usize = 128;
 
-/// Numbers of triangles around vertices that are tested, and of nearby vertices that are visited, in a unit of work.
-const TESTED_PER_UNIT: u64 = 32;
+/// Number of nearby vertices that are visited in a unit of work.
 const VISITED_PER_UNIT: u64 = 16;
 
 impl Resolver {
@@ -44,9 +43,8 @@ impl Resolver {
             while let Some(k) = next {
                 let (tested, visited) = (self.embedding.tested_around(), self.embedding.effort());
                 next = self.restore_vertex(mesh, sampling, guide, u, k);
-                let (tested, visited) =
-                    (self.embedding.tested_around() - tested, self.embedding.effort() - visited);
-                pauses.after((tested / TESTED_PER_UNIT + visited / VISITED_PER_UNIT) as usize).await;
+                let visited = (self.embedding.effort() - visited) / VISITED_PER_UNIT;
+                pauses.after(self.embedding.units_around_since(tested) + visited as usize).await;
             }
         }
     }

@@ -49,7 +49,7 @@ impl Crossings {
                  kept from doing so. Remesh it before, if that matters."
             } else {
                 "The surface intersects itself as given. Its components that do, with themselves or each other, are \
-                        not kept from doing so; all others are. Repair it before, or remesh it, if that matters."
+                 not kept from doing so; all others are. Repair it before, or remesh it, if that matters."
             };
             Warning::new(WarningCode::SelfIntersecting, what)
         })

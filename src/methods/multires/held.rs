@@ -63,9 +63,6 @@ const PASSES: usize = 40;
 /// Number of edges that are halved between two pauses: around a vertex of thousands of edges, each takes a millisecond.
 const EDGES_AT_ONCE: usize = 64;
 
-/// Number of triangles around vertices that are tested in a unit of work.
-const TESTED_PER_UNIT: usize = 32;
-
 /// A surface with the point of the given one for each vertex.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Placed {
@@ -343,7 +340,7 @@ impl Held {
             split += halve_edges(now, surface, &[edge], |mesh, u, v, at| {
                 guard.attempt(mesh, |mesh| mesh.split(u, v, at))
             });
-            pauses.after(1 + (guard.tested_around() - tested) as usize / TESTED_PER_UNIT).await;
+            pauses.after(1 + guard.units_around_since(tested)).await;
         }
         // The new vertices are moved in the next frame.
         self.is_unsettled = split > 0;
@@ -615,7 +612,6 @@ mod tests {
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
-    /// On some of these, the walk from a triangle to the middle of an edge ends elsewhere.
     /// Returns a model of a sphere whose first handle moves.
     fn moving() -> MultiresolutionModel {
         let ball = Mesh::icosphere(Vec3::ZERO, 1.0, 0.2).unwrap().to_triangles();
@@ -674,6 +670,7 @@ mod tests {
         assert!(most > 3 && given_up > 10, "{most} {given_up}");
     }
 
+    /// On some of these, the walk from a triangle to the middle of an edge ends elsewhere.
     #[test]
     fn edges_are_halved_on_the_surface() {
         for seed in 0..20 {

@@ -58,6 +58,9 @@ const SEARCH_SKIN: f32 = 0.04;
 /// rounding. Edges and displacements count as at least this long, and a smaller clearance as none.
 const MIN_LENGTH: f32 = 1e-17;
 
+/// Number of triangles around vertices that are tested after edits in a unit of work.
+const TESTED_PER_UNIT: usize = 32;
+
 /// The vertices found near one vertex. Few vertices have any, so that a list takes one pointer where there is none.
 type NearbyList = Option<Box<SmallVec<[Nearby; 4]>>>;
 
@@ -278,6 +281,11 @@ impl Embedding {
     /// a hub of as many.
     pub(crate) fn tested_around(&self) -> u64 {
         self.tested_around
+    }
+
+    /// Returns the units of work of these tests since [`Self::tested_around`] was `tested`.
+    pub(crate) fn units_around_since(&self, tested: u64) -> usize {
+        (self.tested_around - tested) as usize / TESTED_PER_UNIT
     }
 
     /// Appends the components of another mesh; returns the new vertices, and the corners of all triangles that

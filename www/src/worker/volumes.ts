@@ -22,7 +22,7 @@ function parseFile(file: NamedBytes): VolumeInit {
   try {
     return parseVolume(file.bytes);
   } catch (error) {
-    if (!(error instanceof VesicleError) || !isHeader(file)) throw error;
+    if (!(error instanceof VesicleError) || error.code === 'crash' || !isHeader(file)) throw error;
     throw new Refusal(error.code, text('files.headerWithoutData', { reason: error.message }));
   }
 }
