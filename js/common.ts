@@ -24,6 +24,7 @@ export type {
 export { type ErrorCode, NeedsDataError, VesicleCrash, VesicleError } from './error.js';
 export {
   type CurvatureKind,
+  type Icosphere,
   Mesh,
   type MeshArrays,
   type MeshFormat,

@@ -132,6 +132,14 @@ export interface PositionOptions {
   relative?: boolean;
 }
 
+/** A sphere for {@link Mesh.icosphere}, in world units. */
+export interface Icosphere {
+  center: Vec3;
+  radius: number;
+  /** No edge is longer. */
+  maxEdge: number;
+}
+
 /** File formats that {@link Mesh.toBytes} writes. */
 export type MeshFormat = 'glb' | 'ply' | 'stl' | 'obj' | 'vtp' | 'mz3';
 
@@ -285,15 +293,21 @@ export class Mesh {
   }
 
   /**
-   * Creates a sphere of nearly equilateral triangles with no edge longer than `maxEdge`.
+   * Creates a sphere of nearly equilateral triangles.
    *
+   * @param sphere - Its centre, radius and longest edge. The three as arguments of their own are deprecated.
    * @throws {@link VesicleError} `invalid-argument`; `too-large` for more than four million vertices.
    */
-  static icosphere(center: Vec3, radius: number, maxEdge: number): Mesh {
-    const middle = vec3('center', center);
-    positive('radius', radius);
-    positive('maxEdge', maxEdge);
-    return made(() => RawMesh.icosphere(middle, radius, maxEdge));
+  static icosphere(sphere: Icosphere | Vec3, radius?: number, maxEdge?: number): Mesh {
+    const given = radius === undefined && maxEdge === undefined ? sphere : { center: sphere, radius, maxEdge };
+    const options = checkProperties('sphere', shallowCopy('sphere', given as Icosphere), [
+      'center',
+      'radius',
+      'maxEdge',
+    ]);
+    const center = vec3('center', options.center);
+    const sizes = [positive('radius', options.radius), positive('maxEdge', options.maxEdge)] as const;
+    return made(() => RawMesh.icosphere(center, ...sizes));
   }
 
   /**

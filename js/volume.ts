@@ -229,12 +229,16 @@ export class Volume {
    * Returns the intensity histogram of one frame: the number of voxels in each of `bins` equal parts of
    * {@link Volume.range}. Voxels that are not finite are not counted.
    *
+   * @param options - The number of bins, and the frame, the first by default. The two as arguments of their own are
+   *   deprecated.
    * @throws {@link VesicleError} `invalid-argument`: `bins` not from 1 to 65,536, or no such frame.
    */
-  histogram(bins: number, frame = 0): Uint32Array {
-    integer('bins', bins, { min: 1 });
-    integer('frame', frame);
-    return this.#handle.use((raw) => raw.histogram(bins, frame));
+  histogram(options: { bins: number; frame?: number } | number, frame?: number): Uint32Array {
+    const given = typeof options === 'number' ? { bins: options, frame } : shallowCopy('options', options);
+    const chosen = checkProperties('options', given, ['bins', 'frame']);
+    const bins = integer('bins', chosen.bins, { min: 1 });
+    const index = integer('frame', chosen.frame ?? 0);
+    return this.#handle.use((raw) => raw.histogram(bins, index));
   }
 
   /**
@@ -448,19 +452,24 @@ export class Volume {
    *
    * Entry points with one method lack it.
    *
-   * @param grid - One of these. `dims`: numbers of voxels in the same field of view, whose edges stay in place.
-   *   `spacing`: voxel size, world units, in the same field of view; the result has the nearest size of which a whole
-   *   number of voxels fills it. `like`: the grid of another volume, in its space; what is outside this volume gets
-   *   intensity 0, or the one nearest to 0 that the voxel type can store.
-   * @param how - `'linear'` (default) interpolates intensities as {@link Volume.sample} does, `'nearest'` takes the
-   *   nearest voxel. Use `'nearest'` for label maps.
+   * @param options - One of the first three. `dims`: numbers of voxels in the same field of view, whose edges stay in
+   *   place. `spacing`: voxel size, world units, in the same field of view; the result has the nearest size of which a
+   *   whole number of voxels fills it. `like`: the grid of another volume, in its space; what is outside this volume
+   *   gets intensity 0, or the one nearest to 0 that the voxel type can store. `interpolation`: `'linear'` (default)
+   *   interpolates intensities as {@link Volume.sample} does, `'nearest'` takes the nearest voxel. Use `'nearest'` for
+   *   label maps.
+   * @param how - Deprecated: the interpolation.
    * @throws {@link VesicleError} `invalid-argument`: none or several of the grids, a size out of range, or a volume whose
    *   file states another unit of length; `too-large`, also for more than 50 million voxels, in all frames, of an image from
    *   a file of at most 128 KiB.
    */
-  resample(grid: { dims: Vec3 } | { spacing: Vec3 } | { like: Volume }, how: 'linear' | 'nearest' = 'linear'): Volume {
+  resample(
+    options: ({ dims: Vec3 } | { spacing: Vec3 } | { like: Volume }) & { interpolation?: 'linear' | 'nearest' },
+    how?: 'linear' | 'nearest',
+  ): Volume {
+    const { interpolation = how ?? 'linear', ...grid } = shallowCopy('options', options);
     const resample = resampling(grid);
-    const nearest = choice('how', how, ['linear', 'nearest']) === 'nearest';
+    const nearest = choice('interpolation', interpolation, ['linear', 'nearest']) === 'nearest';
     const most = limitOf(undefined, isOfSmall(this), MOST_RESAMPLED_OF_SMALL);
     return this.#derived((raw) => resample(raw, nearest, most));
   }
@@ -552,7 +561,6 @@ function counts(parameter: string, given: unknown): Uint32Array {
   return Uint32Array.from(vec3(parameter, given), (count) => integer(parameter, count));
 }
 
-/** Returns the call that resamples to the one grid that is given. */
 /** Returns the factor and whether the optical flow is used, of {@link Volume.enrichSlices}, once they are checked. */
 function enrichment(given: { factor?: number; method?: 'flow' | 'linear' }): [number | undefined, boolean] {
   const { factor, method = 'flow' } = checkProperties('options', given, ['factor', 'method']);
@@ -561,14 +569,14 @@ function enrichment(given: { factor?: number; method?: 'flow' | 'linear' }): [nu
   return [factor, method === 'flow'];
 }
 
-function resampling(
-  grid: { dims: Vec3 } | { spacing: Vec3 } | { like: Volume },
-): (raw: RawVolume, nearest: boolean, most?: number) => RawVolume {
-  type Grids = { dims: Vec3; spacing: Vec3; like: Volume };
+type Grids = { dims: Vec3; spacing: Vec3; like: Volume };
+
+/** Returns the call that resamples to the one grid that is given. */
+function resampling(given: Partial<Grids>): (raw: RawVolume, nearest: boolean, most?: number) => RawVolume {
   const names = ['dims', 'spacing', 'like'] as const;
-  const given = checkProperties<Partial<Grids>>('grid', shallowCopy('grid', grid), names);
+  checkProperties('options', given, [...names, 'interpolation']);
   if (names.filter((name) => given[name] !== undefined).length !== 1) {
-    throw invalid('grid', 'give one of dims, spacing, like');
+    throw invalid('options', 'give one of dims, spacing, like');
   }
   if (given.dims !== undefined) {
     const dims = counts('dims', given.dims);

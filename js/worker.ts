@@ -66,6 +66,7 @@ export type {
   ErrorCode,
   Fitness,
   FrameStatistics,
+  Icosphere,
   ImplicitChoice,
   ImplicitOptions,
   ImplicitParams,

@@ -150,7 +150,7 @@ async function report(library, path, name, { levels, pipeline }) {
   const { dims, range } = volume;
   const rows = [];
   const used = Math.min(levels, mostLevels(dims));
-  const isos = dims.every((n) => n >= SMALLEST) ? valleys(volume.histogram(BINS), range, 2) : [];
+  const isos = dims.every((n) => n >= SMALLEST) ? valleys(volume.histogram({ bins: BINS }), range, 2) : [];
   for (const iso of isos) {
     const row = await measured(library, volume, iso, used);
     process.stdout.write(

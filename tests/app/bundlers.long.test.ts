@@ -154,7 +154,8 @@ test.each(['bundler', 'node16', 'nodenext'])(
     const entries = ['vesicle', 'vesicle/inline'];
     const lines = entries.map((entry, k) => `import init${k}, { Mesh as Mesh${k} } from '${entry}';`);
     const uses = entries.map(
-      (_, k) => `await init${k}(); const n${k}: number = Mesh${k}.icosphere([0, 0, 0], 1, 0.5).vertexCount;`,
+      (_, k) =>
+        `await init${k}(); const n${k}: number = Mesh${k}.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.5 }).vertexCount;`,
     );
     await write('main.ts', [...lines, ...uses, `console.log(${entries.map((_, k) => `n${k}`)});`].join('\n'));
     const module = resolution === 'bundler' ? 'esnext' : resolution;

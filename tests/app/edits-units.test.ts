@@ -100,7 +100,10 @@ test('an edit reads as a call of the package', () => {
 });
 
 test('distances in each direction agree with those of both together', () => {
-  const [small, large] = [Mesh.icosphere([0, 0, 0], 1, 0.2), Mesh.icosphere([0.5, 0, 0], 2, 0.7)];
+  const [small, large] = [
+    Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.2 }),
+    Mesh.icosphere({ center: [0.5, 0, 0], radius: 2, maxEdge: 0.7 }),
+  ];
   const { toReference: there, fromReference: back, both } = distancesBetween(small, large);
   expect((there.mean + back.mean) / 2).toBeCloseTo(both.mean, 5);
   expect(Math.sqrt((there.rms ** 2 + back.rms ** 2) / 2)).toBeCloseTo(both.rms, 5);
@@ -116,7 +119,10 @@ test('summaries are weighted', () => {
 });
 
 test('the grid for the Dice coefficient holds both meshes', () => {
-  const [one, other] = [Mesh.icosphere([0, 0, 0], 1, 0.1), Mesh.icosphere([1, 0, 0], 1, 0.1)];
+  const [one, other] = [
+    Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.1 }),
+    Mesh.icosphere({ center: [1, 0, 0], radius: 1, maxEdge: 0.1 }),
+  ];
   const grid = gridAround(one, other);
   const [a, b] = [one, other].map((mesh) => mesh.toVolume(grid)) as [Volume, Volume];
   // Two balls of radius 1 whose centres are 1 apart share 5/16 of their volume.

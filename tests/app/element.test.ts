@@ -173,7 +173,10 @@ test('a mesh without ellipsoids, which stays as it is', async () => {
 });
 
 test('a mesh with ellipsoids, which runs without end', LONG, async () => {
-  await writeFile(join(folder, 'ball.ply'), Mesh.icosphere([0, 0, 0], 1, 0.3).toBytes('ply'));
+  await writeFile(
+    join(folder, 'ball.ply'),
+    Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.3 }).toBytes('ply'),
+  );
   const axes = [0, 1, 2].map((axis) => [0, 1, 2].map((other) => (axis === other ? 0.9 : 0)));
   const ellipsoids = JSON.stringify([{ center: [0, 0, 0], axes }]);
   await open(`<vesicle-lab src="ball.ply" method="multires" ellipsoids='${ellipsoids}' paused></vesicle-lab>`);

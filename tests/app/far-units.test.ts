@@ -72,7 +72,9 @@ describe('points are drawn relative to an origin', () => {
         points,
       ),
     ).toBeLessThan(1e-6);
-    expect(Mesh.icosphere(FAR, 5, 1).origin).toEqual(originOf([...add(FAR, [-5, -5, -5]), ...add(FAR, [5, 5, 5])]));
+    expect(Mesh.icosphere({ center: FAR, radius: 5, maxEdge: 1 }).origin).toEqual(
+      originOf([...add(FAR, [-5, -5, -5]), ...add(FAR, [5, 5, 5])]),
+    );
     expect(off(placed(FAR).points, [0, 0, 0])).toBeLessThan(1);
   });
 });
@@ -80,7 +82,7 @@ describe('points are drawn relative to an origin', () => {
 describe('a surface far away', () => {
   // Twice as long as wide.
   const egg = ([x, y, z]: Vec3) => {
-    const { positions, indices } = Mesh.icosphere([0, 0, 0], 5, 0.5).arrays();
+    const { positions, indices } = Mesh.icosphere({ center: [0, 0, 0], radius: 5, maxEdge: 0.5 }).arrays();
     const place = (value: number, i: number) => (i % 3 === 0 ? x + 2 * value : value + (i % 3 === 1 ? y : z));
     return Mesh.fromArrays(Float64Array.from(positions, place), indices);
   };

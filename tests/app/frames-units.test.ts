@@ -6,7 +6,7 @@ import { capacityFor, copySurface, emptyArrays } from '../../www/src/worker/surf
 
 beforeAll(() => init());
 
-const ball = (edge: number) => Mesh.icosphere([5, 6, 7], 2, edge);
+const ball = (edge: number) => Mesh.icosphere({ center: [5, 6, 7], radius: 2, maxEdge: edge });
 
 function fineOf(mesh: Mesh): FineMesh {
   const { positions, normals, indices, vertices, triangles } = copySurface(emptyArrays(), mesh);

@@ -84,7 +84,7 @@ describe('animations', () => {
 
 describe('fitted ellipsoids', () => {
   test('of a rod lie in a row inside it, and a model can be made of them', () => {
-    const round = Mesh.icosphere([0, 0, 0], 1, 0.2);
+    const round = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.2 });
     const { positions, indices } = round.arrays();
     const rod = Mesh.fromArrays(
       positions.map((x, i) => (i % 3 === 1 ? 4 * x : x)),

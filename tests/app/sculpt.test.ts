@@ -57,7 +57,7 @@ const layouts = () =>
 
 /** Returns a thin plate with a wave in it, over which no smooth base is a graph. */
 function slab(): Mesh {
-  const { positions, indices } = Mesh.icosphere([0, 0, 0], 1, 0.15).arrays();
+  const { positions, indices } = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.15 }).arrays();
   for (let at = 0; at < positions.length; at += 3) {
     const x = positions[at] ?? 0;
     positions[at + 2] = 0.06 * (positions[at + 2] ?? 0) + 0.3 * Math.sin(4 * x);
@@ -407,7 +407,7 @@ describe('a file', () => {
   });
 
   test('can be on a membrane, as in the paper', async () => {
-    const mesh = Mesh.icosphere([3, 0, 0], 2, 0.5);
+    const mesh = Mesh.icosphere({ center: [3, 0, 0], radius: 2, maxEdge: 0.5 });
     await drop(app.page, [{ name: 'ball.ply', bytes: mesh.toBytes('ply') }]);
     mesh.free();
     await expect.poll(() => text('.facts dd')).toBe('ball.ply');
@@ -428,7 +428,9 @@ describe('a file', () => {
   });
 
   test('that intersects itself opens with a warning', async () => {
-    const [one, other] = [0, 1.5].map((x) => Mesh.icosphere([x, 0, 0], 1, 0.3).arrays()) as [Arrays, Arrays];
+    const [one, other] = [0, 1.5].map((x) =>
+      Mesh.icosphere({ center: [x, 0, 0], radius: 1, maxEdge: 0.3 }).arrays(),
+    ) as [Arrays, Arrays];
     const more = other.indices.map((v) => v + one.positions.length / 3);
     const both = Mesh.fromArrays(
       Float32Array.from([...one.positions, ...other.positions]),

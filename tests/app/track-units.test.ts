@@ -191,7 +191,7 @@ describe('windows', () => {
 
 describe('cross-sections', () => {
   test('of a ball are a circle with a plane, and two points with a line', () => {
-    const ball = Mesh.icosphere([0, 0, 0], 10, 1);
+    const ball = Mesh.icosphere({ center: [0, 0, 0], radius: 10, maxEdge: 1 });
     const cut = crossSection(surfaceOf(ball), { origin: [0, 0, 3], normal: [0, 0, 1] });
     expect(cut.length).toBeGreaterThan(6 * 20);
     for (let i = 0; i < cut.length; i += 3) {
@@ -207,7 +207,7 @@ describe('cross-sections', () => {
   });
 
   test('filter the boundary votes near the surface', () => {
-    const ball = Mesh.icosphere([0, 0, 0], 10, 1);
+    const ball = Mesh.icosphere({ center: [0, 0, 0], radius: 10, maxEdge: 1 });
     const votes = { frame: 0, points: Float32Array.of(10, 0, 0, 0, 0, 0), weights: Float32Array.of(0.5, 1) };
     expect([...votesNear(votes, surfaceOf(ball), 2).weights]).toEqual([0.5]);
     ball.free();

@@ -78,7 +78,7 @@ async function smallCine(): Promise<NamedBytes> {
 
 const ball = async (): Promise<NamedBytes> => ({
   name: 'ball.ply',
-  bytes: Mesh.icosphere([0, 0, 0], 1, 0.2).toBytes('ply'),
+  bytes: Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.2 }).toBytes('ply'),
 });
 
 const CASES: Record<string, Case> = {

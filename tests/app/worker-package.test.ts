@@ -94,7 +94,7 @@ test('a worker made by hand works as well; a missing script is reported', async 
     const make = (name) => new Worker(name, { type: 'module' });
     const failed = await init({ worker: make('/nowhere.js') }).catch(({ message }) => message);
     await init({ worker: make('/worker-host.js') });
-    tell([failed, (await (await Mesh.icosphere([0, 0, 0], 1, 1)).info()).genus]);`;
+    tell([failed, (await (await Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 })).info()).genus]);`;
   const [failed, genus] = (await told(`${server.address}package.json`, content)) as [string, number];
   expect(failed).toMatch(/^init: the worker could not be started/);
   expect(genus).toBe(0);
@@ -119,7 +119,7 @@ test('a strict content security policy is sufficient', async () => {
   const headers = {
     'Content-Security-Policy': `default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'`,
   };
-  const script = `${LIBRARY} await init(); tell((await (await Mesh.icosphere([0, 0, 0], 1, 1)).info()).genus);`;
+  const script = `${LIBRARY} await init(); tell((await (await Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 })).info()).genus);`;
   const page = '<script type="module" src="/page.js"></script>';
   const strict = await publish(headers, { '/page.html': page, '/page.js': caught(script) });
   const tab = await browser.newPage();
@@ -138,7 +138,7 @@ test("from another origin the worker starts through a script of the page's own",
     const content = `
       const { default: init, Mesh } = await import('${network.address}worker.js');
       await init();
-      tell((await (await Mesh.icosphere([0, 0, 0], 1, 1)).info()).genus);`;
+      tell((await (await Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 })).info()).genus);`;
     expect(await told(`${server.address}package.json`, content)).toBe(0);
   } finally {
     network.close();
@@ -150,7 +150,7 @@ test('Vite bundles the worker and the module in it', LONG, async () => {
   const script = `
     import init, { Mesh } from 'vesicle/worker';
     const tell = (value) => { document.title = JSON.stringify(value); };
-    const genus = async () => (await (await Mesh.icosphere([0, 0, 0], 1, 1)).info()).genus;
+    const genus = async () => (await (await Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 })).info()).genus;
     init().then(genus).then(tell, (error) => tell(String(error)));`;
   await writeFile(join(folder, 'index.html'), `<script type="module" src="./main.js"></script>`);
   await writeFile(join(folder, 'main.js'), script);

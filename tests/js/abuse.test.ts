@@ -136,7 +136,7 @@ let film: vesicle.Volume;
 
 beforeAll(() => {
   volume = ball(12, 4);
-  mesh = Mesh.icosphere([0, 0, 0], 4, 2);
+  mesh = Mesh.icosphere({ center: [0, 0, 0], radius: 4, maxEdge: 2 });
   const two = [ball(12, 4), ball(12, 4.5)];
   film = Volume.fromFrames(two, { frameSeconds: 1 });
   for (const one of two) one.free();
@@ -289,10 +289,10 @@ test('with memory nearly full, calls fail with a named error and succeed again o
     const work = {
       voxels: () => new Volume({ data: voxels, dims: [size, size, size] }).pyramid(2),
       model: () => {
-        const model = new DeformableModel({ volume: held.at(-1), params: { iso: 100 }, start: Mesh.icosphere([0, 0, 0], 9, 1) });
+        const model = new DeformableModel({ volume: held.at(-1), params: { iso: 100 }, start: Mesh.icosphere({ center: [0, 0, 0], radius: 9, maxEdge: 1 }) });
         model.step(20);
       },
-      sphere: () => Mesh.icosphere([0, 0, 0], 100, 1),
+      sphere: () => Mesh.icosphere({ center: [0, 0, 0], radius: 100, maxEdge: 1 }),
     };
     const came = {};
     for (const [name, make] of Object.entries(work)) {

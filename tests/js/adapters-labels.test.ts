@@ -379,7 +379,7 @@ test('NiiVue: the page is told of a drawing too far away to be shown, also after
 });
 
 test('NiiVue: outlines are closed, also through vertices', () => {
-  const { positions, indices } = Mesh.icosphere([0, 0, 0], 2, 0.4).arrays();
+  const { positions, indices } = Mesh.icosphere({ center: [0, 0, 0], radius: 2, maxEdge: 0.4 }).arrays();
   const outline = new Outline([1, 0, 0], 1);
   outline.set(positions.slice(), indices.slice());
   for (const offset of [0, 0.3, -1.1, positions[3 * 7 + 2] ?? 0]) {

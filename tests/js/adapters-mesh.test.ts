@@ -35,7 +35,7 @@ class Plain implements MeshSource {
   }
 }
 
-const sphere = (maxEdge: number): MeshArrays => Mesh.icosphere([3, 2, 1], 2, maxEdge).arrays();
+const sphere = (maxEdge: number): MeshArrays => Mesh.icosphere({ center: [3, 2, 1], radius: 2, maxEdge }).arrays();
 
 let source: Plain;
 beforeEach(() => {

@@ -104,7 +104,7 @@ test('every kind of start', async () => {
     [{ bubbles: 3 }, 1],
     [{ seeds: Float32Array.of(1, 0, 0), radius: 4 }, 1],
     [{ marchingCubes: 100 }, 1],
-    [Mesh.icosphere([0, 0, 0], 6, 2), 1],
+    [Mesh.icosphere({ center: [0, 0, 0], radius: 6, maxEdge: 2 }), 1],
   ];
   for (const [start, components] of starts) {
     const report = await model({ start: start as NonNullable<Options['start']> }).run({ maxIterations: 400 });
@@ -349,7 +349,7 @@ test('the seeds of a run are counted', async () => {
 });
 
 test('matter that a surface leaves out is reported as such, and small parts are not', async () => {
-  const start = Mesh.icosphere([22, 24, 24], 14, 2);
+  const start = Mesh.icosphere({ center: [22, 24, 24], radius: 14, maxEdge: 2 });
   const given = { volume: ballWithHollowAndPlate(), start };
   const kinds = async (params: DeformableParams) => {
     const { uncovered } = await model({ ...given, params: { ...ADAPTING, ...params } }).coverage();
@@ -405,7 +405,7 @@ test('invalid options of a measurement are refused', async () => {
   }
 });
 
-const closed = Mesh.icosphere([0, 0, 0], 6, 2);
+const closed = Mesh.icosphere({ center: [0, 0, 0], radius: 6, maxEdge: 2 });
 const REFUSED: [string, string, string, () => unknown][] = [
   ['no options', 'invalid-argument', 'volume', () => new DeformableModel(wrong(undefined))],
   ['no volume', 'invalid-argument', 'volume', () => new DeformableModel(wrong({}))],

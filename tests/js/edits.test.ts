@@ -8,9 +8,9 @@ const UP = { origin: [0, 0, 0.1] as [number, number, number], normal: [0, 0, 2] 
 /** Returns a ball of radius 3 with a cavity of radius 1, and beside it one of radius 1: three components. */
 function hollow(): Mesh {
   const parts = [
-    Mesh.icosphere([0, 0, 0], 3, 0.5),
-    Mesh.icosphere([0, 0, 0], 1, 0.5),
-    Mesh.icosphere([6, 0, 0], 1, 0.5),
+    Mesh.icosphere({ center: [0, 0, 0], radius: 3, maxEdge: 0.5 }),
+    Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.5 }),
+    Mesh.icosphere({ center: [6, 0, 0], radius: 1, maxEdge: 0.5 }),
   ];
   const arrays = parts.map((part) => part.arrays());
   // Reversed, the triangles of the cavity face inwards.
@@ -25,7 +25,7 @@ function joined(parts: MeshArrays[]): Mesh {
 }
 
 test('a cut keeps the side away from the normal, closed', () => {
-  const mesh = Mesh.icosphere([0, 0, 0], 1, 0.2);
+  const mesh = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.2 });
   const whole = mesh.info();
   const other = mesh.clone();
   const { geometryVersion } = mesh;
@@ -43,7 +43,7 @@ test('a cut keeps the side away from the normal, closed', () => {
 });
 
 test('a cut that is refused changes nothing', () => {
-  const mesh = Mesh.icosphere([0, 0, 0], 1, 0.2);
+  const mesh = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.2 });
   const { positions } = mesh.arrays();
   expect(failure(() => mesh.cut({ origin: [0, 0, -2], normal: [0, 0, 1] })).code).toBe('invalid-argument');
   expect(failure(() => mesh.cut({ origin: [0, 0, 0], normal: [0, 0, 0] })).message).toContain('normal');
@@ -52,7 +52,7 @@ test('a cut that is refused changes nothing', () => {
   expect(mesh.arrays().positions).toEqual(positions);
   const open = Mesh.fromArrays(Float32Array.of(0, 0, 0, 1, 0, 0, 0, 1, 0), Uint32Array.of(0, 1, 2));
   expect(failure(() => open.cut(UP)).code).toBe('not-closed');
-  const crossing = joined([0, 0.7].map((x) => Mesh.icosphere([x, 0, 0], 1, 0.5).arrays()));
+  const crossing = joined([0, 0.7].map((x) => Mesh.icosphere({ center: [x, 0, 0], radius: 1, maxEdge: 0.5 }).arrays()));
   expect(failure(() => crossing.cut(UP)).code).toBe('self-intersecting');
 });
 

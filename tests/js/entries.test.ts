@@ -72,7 +72,7 @@ describe('an entry point with one method', () => {
 
   test.each(METHODS)('%s works with meshes and volumes', (method) => {
     const { Mesh, Volume } = entries[method];
-    const copy = Mesh.icosphere([0, 0, 0], 1, 0.3);
+    const copy = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.3 });
     copy.remesh({ min: 0.1, max: 0.3 });
     expect(copy.check()).toMatchObject({ closed: true, selfIntersections: 0 });
     const volume = new Volume({ data: Uint8Array.from({ length: 64 }, (_, i) => i), dims: [4, 4, 4] });
@@ -121,10 +121,12 @@ describe('an entry point with one method', () => {
   });
 
   test('throws the errors of vesicle, and takes no object of another module', () => {
-    const mesh = vesicle.Mesh.icosphere([0, 0, 0], 1, 0.3);
+    const mesh = vesicle.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.3 });
     const work = () => new multires.MultiresolutionModel({ ellipsoids: [], detail: mesh as never });
     expect(work).toThrow(vesicle.VesicleError);
-    expect(() => multires.Mesh.icosphere([0, 0, 0], -1, 0.3)).toThrow(vesicle.VesicleError);
+    expect(() => multires.Mesh.icosphere({ center: [0, 0, 0], radius: -1, maxEdge: 0.3 })).toThrow(
+      vesicle.VesicleError,
+    );
     const volume = new vesicle.Volume({ data: new Uint8Array(8), dims: [2, 2, 2] });
     expect(() => deformable.Mesh.marchingCubes(volume as never, 0.5)).toThrow(/^volume: must be a Volume/);
     // @ts-expect-error: a volume of another module is another type.

@@ -25,7 +25,7 @@ import { failure, HEALTHY, rejection, wrong } from './helpers.js';
 
 /** Metres of a UTM zone, in Bavaria. */
 const UTM: Vec3 = [512434, 5405590, 348];
-const far = (radius = 5, edge = 1) => Mesh.icosphere(UTM, radius, edge);
+const far = (radius = 5, edge = 1) => Mesh.icosphere({ center: UTM, radius, maxEdge: edge });
 
 /** Points on a ball of 2 m around `UTM`, packed. */
 function surveyed(count: number): Float64Array {
@@ -43,7 +43,7 @@ const distance = (a: ArrayLike<number>, b: ArrayLike<number>) =>
 
 describe('a mesh', () => {
   test('near the origin has none of its own, and its arrays are in world space', () => {
-    const mesh = Mesh.icosphere([30, 0, 0], 2, 1);
+    const mesh = Mesh.icosphere({ center: [30, 0, 0], radius: 2, maxEdge: 1 });
     expect(mesh.origin).toEqual([0, 0, 0]);
     const { origin, ...relative } = mesh.arrays({ relative: true });
     expect(origin).toEqual([0, 0, 0]);
@@ -117,7 +117,7 @@ describe('a mesh', () => {
   });
 
   test('is transformed, compared and animated in double precision', () => {
-    const near = Mesh.icosphere([0, 0, 0], 5, 1);
+    const near = Mesh.icosphere({ center: [0, 0, 0], radius: 5, maxEdge: 1 });
     near.transform([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...UTM, 1]);
     expect(near.distanceTo(far()).hausdorff).toBeLessThan(1e-5);
     const node = new TextDecoder().decode(animationGlb([near, far(4)])).match(/"translation":\[[^\]]*\]/g);
@@ -255,7 +255,7 @@ describe('in other software', () => {
     const lps = new ThreeSurface(THREE, object, { space: 'RAS', worldSpace: 'LPS' });
     lps.update(far());
     expect(object.position.x).toBe(-far().origin[0]);
-    surface.update(Mesh.icosphere([0, 0, 0], 1, 1));
+    surface.update(Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 }));
     expect(object.position.toArray()).toEqual([0, 0, 0]);
   });
 
@@ -308,7 +308,7 @@ describe('in other software', () => {
     const nv = wrong({ addMesh: (mesh: object) => meshes.push(mesh), removeMesh, meshes, view: {} });
     const surface = new NiivueSurface(nv, { outline: 0, recentre: true });
     const shown = [];
-    for (const mesh of [far(), far(), far(3), Mesh.icosphere([0, 0, 0], 5, 1)]) {
+    for (const mesh of [far(), far(), far(3), Mesh.icosphere({ center: [0, 0, 0], radius: 5, maxEdge: 1 })]) {
       await surface.update(mesh);
       expect(meshes.length).toBe(1);
       shown.push(meshes[0]);
@@ -333,7 +333,7 @@ describe('in other software', () => {
 
   test('a worker gives the same', async () => {
     await init();
-    const mesh = await worker.Mesh.icosphere(UTM, 5, 1);
+    const mesh = await worker.Mesh.icosphere({ center: UTM, radius: 5, maxEdge: 1 });
     expect(await mesh.origin).toEqual(far().origin);
     expect((await rejection(mesh.arrays())).code).toBe('precision');
     expect(await mesh.arrays({ relative: true })).toEqual(far().arrays({ relative: true }));

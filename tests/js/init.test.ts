@@ -74,15 +74,15 @@ const CRASH = `
   import { RawMesh } from './pkg/vesicle.js';
   const attempt = (work) => { try { return work(); } catch (error) { return error.name + ' ' + error.code; } };
   await init();
-  const old = Mesh.icosphere([0, 0, 0], 1, 1);
+  const old = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 });
   const { info } = RawMesh.prototype;
   RawMesh.prototype.info = () => { throw new WebAssembly.RuntimeError('unreachable'); };
   const seen = [attempt(() => old.info())];
   RawMesh.prototype.info = info;
-  seen.push(attempt(() => old.info()), attempt(() => Mesh.icosphere([0, 0, 0], 1, 1)));
+  seen.push(attempt(() => old.info()), attempt(() => Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 })));
   await init();
   seen.push(attempt(() => old.info()), attempt(() => old.free()));
-  seen.push(attempt(() => Mesh.icosphere([0, 0, 0], 1, 1).info().genus));
+  seen.push(attempt(() => Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 }).info().genus));
   console.log(JSON.stringify(seen));`;
 
 test('after a crash every call reports it, until init starts a new instance', () => {

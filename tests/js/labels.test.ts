@@ -70,7 +70,9 @@ test('resampled to dimensions, to a spacing, and like another volume', () => {
     [1, 1, 1],
     [-0.5, 0, 0],
   ]);
-  expect([...ramp.resample({ dims: [8, 1, 1] }, 'nearest').intensities()]).toEqual([0, 0, 2, 2, 4, 4, 6, 6]);
+  expect([...ramp.resample({ dims: [8, 1, 1], interpolation: 'nearest' }).intensities()]).toEqual([
+    0, 0, 2, 2, 4, 4, 6, 6,
+  ]);
   expect(ramp.resample({ spacing: [1.1, 1, 1] }).dims).toEqual([7, 1, 1]);
   const like = new Volume({ data: new Uint8Array(5), dims: [5, 1, 1], spacing: [2, 1, 1], origin: [-5, 0, 0] });
   const there = like.resample({ like: ramp });
@@ -167,12 +169,12 @@ const REFUSED: [string, string, () => unknown][] = [
   ['a box of parts', 'box.max', () => map().crop({ min: [0, 0, 0], max: [1.5, 2, 2] })],
   ['a box without an end', 'box.max', () => map().crop(wrong({ min: [0, 0, 0] }))],
   ['a misspelled box', 'size', () => map().crop(wrong({ min: [0, 0, 0], size: [1, 1, 1] }))],
-  ['no grid', 'grid', () => map().resample(wrong({}))],
-  ['two grids', 'grid', () => map().resample({ dims: DIMS, spacing: [1, 1, 1] })],
+  ['no grid', 'options', () => map().resample(wrong({}))],
+  ['two grids', 'options', () => map().resample({ dims: DIMS, spacing: [1, 1, 1] })],
   ['dims of 0', 'dims', () => map().resample({ dims: [3, 0, 2] })],
   ['a spacing of 0', 'spacing', () => map().resample({ spacing: [1, 0, 1] })],
   ['a grid like nothing', 'like', () => map().resample({ like: wrong({}) })],
-  ['interpolation by magic', 'how', () => map().resample({ dims: DIMS }, wrong('magic'))],
+  ['interpolation by magic', 'interpolation', () => map().resample({ dims: DIMS, interpolation: wrong('magic') })],
   ['a frame too far', 'frame', () => map().frame(1)],
   ['another format', 'format', () => map().toBytes(wrong('nii'))],
   ['compression by number', 'gzip', () => map().toBytes('nrrd', { gzip: wrong(9) })],

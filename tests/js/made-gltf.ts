@@ -38,7 +38,7 @@ export interface Given {
 
 /** Returns a ball of radius 1. */
 export function ball(edge = 0.3): Given {
-  const mesh = Mesh.icosphere([0, 0, 0], 1, edge);
+  const mesh = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: edge });
   const { positions, indices } = mesh.arrays();
   mesh.free();
   return { positions: Float32Array.from(positions), indices: Uint32Array.from(indices) };

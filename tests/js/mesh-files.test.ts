@@ -28,7 +28,7 @@ const text = (file: Uint8Array) => new TextDecoder('latin1').decode(file);
 
 /** A head of 160 × 180 × 200 mm in RAS, with its middle at (10, -20, 30). */
 function head(): Mesh {
-  const mesh = Mesh.icosphere([0, 0, 0], 1, 0.5);
+  const mesh = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.5 });
   mesh.transform(Float64Array.of(80, 0, 0, 0, 0, 90, 0, 0, 0, 0, 100, 0, 10, -20, 30, 1));
   return mesh;
 }

@@ -5,7 +5,7 @@ import { failure, rejection, wrong } from './helpers.js';
 
 /** Returns a bumpy sphere as a list of triangles, on which each operation has many slices. */
 function bumpy(): Mesh {
-  const { positions, indices } = Mesh.icosphere([0, 0, 0], 1, 0.1).arrays();
+  const { positions, indices } = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.1 }).arrays();
   const at = (k: number) => positions[k] as number;
   const scale = (k: number) => 1 + 0.1 * Math.sin(5 * at(k)) * Math.cos(7 * at(k + 1)) + 0.004 * ((k * 7) % 5);
   const moved = positions.map((value, i) => value * scale(i - (i % 3)));
@@ -19,7 +19,7 @@ const GRID = new Volume({
   spacing: [0.1, 0.1, 0.1],
   origin: [-1.5, -1.5, -1.5],
 });
-const OTHER = Mesh.icosphere([0.1, 0, 0], 1, 0.1);
+const OTHER = Mesh.icosphere({ center: [0.1, 0, 0], radius: 1, maxEdge: 0.1 });
 
 /** Each operation, which both kinds of objects have. */
 const OPERATIONS: Record<keyof MeshInSlices, (mesh: Mesh | MeshInSlices) => unknown> = {
@@ -164,7 +164,7 @@ test('a mesh that is freed ends the operation', async () => {
 });
 
 test('refusals are those of the methods, as rejections', async () => {
-  const mesh = Mesh.icosphere([0, 0, 0], 1, 0.5);
+  const mesh = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.5 });
   const { positions, indices } = mesh.arrays();
   const open = Mesh.fromArrays(positions, indices.slice(3));
   const refused: [string, () => Promise<unknown>][] = [

@@ -2,7 +2,7 @@ import { expect, test } from 'vitest';
 import { Mesh, type MeshArrays, type MeshFormat } from '../../pkg/index.js';
 import { ball, failure, HEALTHY, wrong } from './helpers.js';
 
-const sphere = (radius = 1, edge = 0.2) => Mesh.icosphere([0, 0, 0], radius, edge);
+const sphere = (radius = 1, edge = 0.2) => Mesh.icosphere({ center: [0, 0, 0], radius, maxEdge: edge });
 
 /** A tetrahedron with a corner at the origin; without its last face it is open. */
 const CORNERS = Float32Array.from([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]);
@@ -343,9 +343,11 @@ test('mz3: magic number, counts, arrays', () => {
 });
 
 const REFUSED: [string, string, () => unknown][] = [
-  ['no centre', 'center', () => Mesh.icosphere(wrong(undefined), 1, 1)],
-  ['a radius of 0', 'radius', () => Mesh.icosphere([0, 0, 0], 0, 1)],
-  ['NaN for an edge', 'maxEdge', () => Mesh.icosphere([0, 0, 0], 1, Number.NaN)],
+  ['no centre', 'center', () => Mesh.icosphere({ center: wrong(undefined), radius: 1, maxEdge: 1 })],
+  ['no sphere', 'sphere', () => Mesh.icosphere(wrong(undefined))],
+  ['a misspelled option', 'edge', () => Mesh.icosphere(wrong({ center: [0, 0, 0], radius: 1, edge: 1 }))],
+  ['a radius of 0', 'radius', () => Mesh.icosphere({ center: [0, 0, 0], radius: 0, maxEdge: 1 })],
+  ['NaN for an edge', 'maxEdge', () => Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: Number.NaN })],
   ['plain numbers', 'positions', () => Mesh.fromArrays(wrong([0, 0, 0]), FACES)],
   ['half a vertex', 'positions', () => Mesh.fromArrays(CORNERS.slice(1), FACES)],
   [
@@ -406,7 +408,7 @@ test('invalid files are refused', () => {
 });
 
 test('more triangles than fit into memory are refused', { tags: ['long'] }, () => {
-  expect(failure(() => Mesh.icosphere([0, 0, 0], 1, 1e-6)).code).toBe('too-large');
+  expect(failure(() => Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1e-6 })).code).toBe('too-large');
 });
 
 test('use after free is refused', () => {
@@ -431,7 +433,7 @@ test('use after free is refused', () => {
 });
 
 test('directions of any length are accepted', () => {
-  const sphere = Mesh.icosphere([0, 0, 0], 1, 0.3);
+  const sphere = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.3 });
   for (const length of [1e-60, 1, 1e60, 1e300]) {
     expect(sphere.pick([0, 0, 3], [0, 0, -length])?.distance).toBeCloseTo(2, 1);
     expect(sphere.crossSection([0, 0, 0.05], [0, 0, length]).length).toBeGreaterThan(50);
@@ -439,6 +441,6 @@ test('directions of any length are accepted', () => {
 });
 
 test('arrays are copied from an object of arrays only', () => {
-  const sphere = Mesh.icosphere([0, 0, 0], 1, 0.5);
+  const sphere = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.5 });
   expect(failure(() => sphere.copyTo(null as never)).code).toBe('invalid-argument');
 });

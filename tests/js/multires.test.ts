@@ -28,7 +28,7 @@ function model(more: Partial<Options> = {}): MultiresolutionModel {
 
 /** Returns a ball with waves on it. */
 function wavy(edge = 0.15): Mesh {
-  const { positions, indices } = Mesh.icosphere([0, 0, 0], 1, edge).arrays();
+  const { positions, indices } = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: edge }).arrays();
   for (let at = 0; at < positions.length; at += 3) {
     const height = 1.05 + 0.04 * Math.sin(6 * (positions[at] as number)) * Math.cos(5 * (positions[at + 2] as number));
     for (let k = 0; k < 3; k++) positions[at + k] = (positions[at + k] as number) * height;
@@ -66,7 +66,7 @@ test('pulled apart it splits, and each frame is valid', () => {
 
 test('detail is kept, and its distortion is reported', () => {
   const detail = wavy();
-  const base = Mesh.icosphere([0, 0, 0], 1, 0.2);
+  const base = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.2 });
   const deformed = model({
     detail,
     base,
@@ -88,7 +88,7 @@ test('detail is kept, and its distortion is reported', () => {
 });
 
 test('texture coordinates move with the surface', () => {
-  const globe = Mesh.icosphere([0, 0, 0], 1, 0.15).arrays();
+  const globe = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.15 }).arrays();
   const uvs = new Float32Array((globe.positions.length / 3) * 2);
   for (let v = 0; v < uvs.length / 2; v++) {
     const [x = 0, y = 0, z = 0] = globe.positions.subarray(3 * v, 3 * v + 3);
@@ -158,7 +158,7 @@ test('a state is restored bit for bit', () => {
 test('levels and single restructuring passes can be inspected', () => {
   const levels = model({ params: { edgeMin: 0.06, edgeMax: 0.13 } }).levelMeshes();
   expect(levels.length).toBeGreaterThan(1);
-  const mesh = Mesh.icosphere([0, 0, 0], 1, 0.2);
+  const mesh = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.2 });
   const before = mesh.triangleCount;
   expect(mesh.restructure({ min: 0.2, max: 0.5 }, ['collapse'])).toBeGreaterThan(0);
   expect(mesh.triangleCount).toBeLessThan(before);
@@ -236,7 +236,7 @@ test('invalid arguments are refused by name', async () => {
   const paper = { detail: wavy(), support: 'membrane' } as const;
   expect(message(() => model({ ...paper, ellipsoids: [ball(9, 1)] }))).toContain('must touch');
   expect(code(() => model({ params: { edgeMin: 1e-5, edgeMax: 3e-5 } }))).toBe('too-large');
-  const open = Mesh.icosphere([0, 0, 0], 1, 0.5).arrays();
+  const open = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.5 }).arrays();
   const hole = Mesh.fromArrays(open.positions, open.indices.slice(3));
   expect(code(() => model({ detail: hole }))).toBe('not-closed');
   expect(code(() => model({ base: hole }))).toBe('not-closed');
@@ -276,7 +276,12 @@ test('a model can be created in slices, with the same bits, and not if that is a
   const given: Options[] = [
     { detail: wavy() },
     { detail: wavy(), support: 'membrane', ellipsoids: [ball(0, 0.9)], params: EDGES },
-    { detail: wavy(), base: Mesh.icosphere([0, 0, 0], 1, 0.2), ellipsoids: [ball(0, 0.9)], params: EDGES },
+    {
+      detail: wavy(),
+      base: Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.2 }),
+      ellipsoids: [ball(0, 0.9)],
+      params: EDGES,
+    },
     { ellipsoids: [ball(-0.5, 1), ball(0.5, 0.8)], params: EDGES },
   ];
   for (const options of given) {

@@ -22,7 +22,7 @@ for (const { name, ...options } of VOLUMES) {
 
 async function findsContour(name) {
   const volume = await volumeOf(name);
-  for (const iso of valleys(volume.histogram(256), volume.range, 2)) {
+  for (const iso of valleys(volume.histogram({ bins: 256 }), volume.range, 2)) {
     const row = await measured(library, volume, iso, 0);
     expect(row, `at ${iso}`).toSatisfy(isComplete);
     expect(row).toMatchObject({ intersections: 0 });
@@ -33,7 +33,7 @@ async function findsContour(name) {
 
 test('coarse to fine, too', async () => {
   const volume = await volumeOf('tooth.nrrd');
-  const [iso = 0] = valleys(volume.histogram(256), volume.range, 1);
+  const [iso = 0] = valleys(volume.histogram({ bins: 256 }), volume.range, 1);
   expect(await measured(library, volume, iso, 2)).toSatisfy(isComplete);
   volume.free();
 });

@@ -208,7 +208,7 @@ test('a small file with a slope is not written as many times its voxels', () => 
 test('an image of a small file is resampled to fifty million voxels at most, any other to as many as there is memory for', () => {
   const [small, large] = [nrrd('gzip'), nrrd('raw')].map((bytes) => Volume.parse(bytes)) as [Volume, Volume];
   for (const grid of [{ dims: [369, 369, 369] }, { spacing: [0.28, 0.28, 0.28] }, { like: large }] as const) {
-    const resample = (volume: Volume) => volume.resample(wrong(grid), 'nearest');
+    const resample = (volume: Volume) => volume.resample({ ...wrong(grid), interpolation: 'nearest' });
     if ('like' in grid) expect(resample(small).dims).toEqual([SIZE, SIZE, SIZE]);
     else
       expect(failure(() => resample(small))).toMatchObject({
@@ -216,6 +216,6 @@ test('an image of a small file is resampled to fifty million voxels at most, any
         message: expect.stringMatching(/needs 5\d{7} bytes/),
       });
   }
-  expect(small.resample({ dims: [300, 300, 300] }, 'nearest').dims).toEqual([300, 300, 300]);
-  expect(large.resample({ dims: [369, 369, 369] }, 'nearest').dims).toEqual([369, 369, 369]);
+  expect(small.resample({ dims: [300, 300, 300], interpolation: 'nearest' }).dims).toEqual([300, 300, 300]);
+  expect(large.resample({ dims: [369, 369, 369], interpolation: 'nearest' }).dims).toEqual([369, 369, 369]);
 });

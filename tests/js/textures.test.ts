@@ -90,7 +90,7 @@ test('a texture for a file without coordinates, and compressed files', async () 
 const loaded = (glb: Uint8Array): Promise<GLTF> => new GLTFLoader().parseAsync(glb.buffer as ArrayBuffer, '');
 
 test('three.js shows exactly one frame of an animation at a time', async () => {
-  const frames = [1, 0.7, 0.5, 0.4].map((edge) => Mesh.icosphere([0, 0, 0], 1, edge));
+  const frames = [1, 0.7, 0.5, 0.4].map((edge) => Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: edge }));
   const { scene, animations } = await loaded(animationGlb(frames, { frameSeconds: 0.25 }));
   const visible = () => {
     const seen: Object3D[] = scene.children.filter(({ scale }) => scale.x !== 0 || scale.y !== 0 || scale.z !== 0);
@@ -121,7 +121,7 @@ test('equal frames and textures of an animation are stored once', () => {
 });
 
 test('the first frame of an animation is its static pose', () => {
-  const frames = [0.9, 0.6].map((edge) => Mesh.icosphere([0, 0, 0], 1, edge));
+  const frames = [0.9, 0.6].map((edge) => Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: edge }));
   const first = Mesh.parse(animationGlb(frames));
   expect(first.check()).toEqual(HEALTHY);
   expect(first.triangleCount).toBe(frames[0]?.triangleCount);

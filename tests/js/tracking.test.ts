@@ -307,7 +307,7 @@ test('an invalid state is refused and changes nothing', () => {
     tracker({ volume: other }).save(),
   );
   const boxed = tracker({ volume: short, box: { min: REACH.min, max: MIDDLE } }).save();
-  const started = tracker({ volume: short, start: Mesh.icosphere(MIDDLE, 8, 2) }).save();
+  const started = tracker({ volume: short, start: Mesh.icosphere({ center: MIDDLE, radius: 8, maxEdge: 2 }) }).save();
   for (const bytes of [...broken, ...others, boxed, started]) {
     expect(failure(() => one.restore(bytes)).code).toBe('bad-file');
   }
@@ -464,7 +464,7 @@ test('setting the same values does not restart', () => {
 });
 
 test('a given start surface is tracked', () => {
-  const start = Mesh.icosphere(MIDDLE, 8, 2);
+  const start = Mesh.icosphere({ center: MIDDLE, radius: 8, maxEdge: 2 });
   const one = tracker({ volume: short, start });
   expect(one.mesh.triangleCount).toBe(start.triangleCount);
   start.free();
@@ -553,7 +553,7 @@ test("default thresholds and lengths depend on the volume's noise and voxels", (
   expect(timeScale).toBeLessThan(radius);
 });
 
-const closed = Mesh.icosphere(MIDDLE, 8, 2).arrays();
+const closed = Mesh.icosphere({ center: MIDDLE, radius: 8, maxEdge: 2 }).arrays();
 const open = () => Mesh.fromArrays(closed.positions, closed.indices.slice(3));
 const insideOut = () => Mesh.fromArrays(closed.positions, closed.indices.toReversed());
 /** Returns a mesh of two intersecting balls. */
@@ -670,7 +670,7 @@ test('a tracker survives its volume, and a freed tracker is refused', () => {
   ];
   for (const use of uses) expect(failure(use).code).toBe('freed');
   expect(failure(() => tracker({ volume: own })).code).toBe('freed');
-  const start = Mesh.icosphere(MIDDLE, 8, 2);
+  const start = Mesh.icosphere({ center: MIDDLE, radius: 8, maxEdge: 2 });
   start.free();
   expect(failure(() => tracker({ start })).code).toBe('freed');
   const scoped = tracker();

@@ -1,6 +1,6 @@
 import { gzipSync } from 'node:zlib';
 import { expect, test } from 'vitest';
-import { type Vec3, Volume, type VoxelArray } from '../../pkg/index.js';
+import { type Icosphere, Mesh, type Vec3, Volume, type VoxelArray } from '../../pkg/index.js';
 import { ball, failure, wrong } from './helpers.js';
 
 const ELEMENTS = [
@@ -52,9 +52,22 @@ test('slices are row-major', () => {
 });
 
 test('the histogram counts every voxel once', () => {
-  const counts = ball(9, 3).histogram(16);
+  const counts = ball(9, 3).histogram({ bins: 16 });
   expect(counts).toHaveLength(16);
   expect(counts.reduce((sum, count) => sum + count)).toBe(9 ** 3);
+});
+
+test('former calls, with arguments of their own, do the same as those with options', () => {
+  const volume = grid();
+  expect(volume.histogram(4, 0)).toEqual(volume.histogram({ bins: 4 }));
+  expect(() => volume.histogram(4, 1)).toThrow(/frame/);
+  const to: { dims: Vec3 } = { dims: [5, 4, 3] };
+  expect(volume.resample(to, 'nearest').intensities()).toEqual(
+    volume.resample({ ...to, interpolation: 'nearest' }).intensities(),
+  );
+  expect(volume.resample(to, 'nearest').intensities()).not.toEqual(volume.resample(to).intensities());
+  const options: Icosphere = { center: [1, 2, 3], radius: 4, maxEdge: 2 };
+  expect(Mesh.icosphere(options.center, 4, 2).arrays()).toEqual(Mesh.icosphere(options).arrays());
 });
 
 test('outside, the border is replicated', () => {
@@ -217,7 +230,9 @@ const REFUSED: [string, string, () => unknown][] = [
   ['a frame too far', 'frame', () => grid().intensities(1)],
   ['an axis too far', 'axis', () => grid().slice(wrong(3), 0)],
   ['a slice too far', 'index', () => grid().slice(2, 4)],
-  ['no bins', 'bins', () => grid().histogram(0)],
+  ['no bins', 'bins', () => grid().histogram({ bins: 0 })],
+  ['bins in words', 'options', () => grid().histogram(wrong('ten'))],
+  ['a misspelled option', 'bin', () => grid().histogram(wrong({ bin: 3 }))],
   ['half a point', 'world', () => grid().sample(wrong([1, 2]))],
   ['NaN for a point', 'world', () => grid().sample([1, 2, Number.NaN])],
   ['a growing pyramid', 'factor', () => grid().pyramid(2, { factor: 0.5 })],

@@ -3,7 +3,7 @@ import { expect, test } from 'vitest';
 import { DeformableModel, Mesh, Volume } from '../../pkg/index.js';
 import { ball, failure, HEALTHY } from './helpers.js';
 
-const sphere = (radius: number, edge: number) => Mesh.icosphere([0, 0, 0], radius, edge);
+const sphere = (radius: number, edge: number) => Mesh.icosphere({ center: [0, 0, 0], radius, maxEdge: edge });
 
 /** Returns an empty volume of `size`³ voxels of side `spacing`, centred at the world's origin. */
 function grid(size: number, spacing = 1): Volume {

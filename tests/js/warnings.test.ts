@@ -71,7 +71,7 @@ test('the mesh of a model has the warnings of its data', () => {
   expect(model.mesh.warnings).toEqual([LONG]);
   const { warnings } = model.step();
   expect(model.mesh.warnings).toEqual([LONG, ...warnings.filter(({ code }) => code !== LONG.code)]);
-  const sphere = Mesh.icosphere([0, 0, 0], 1, 0.5).arrays();
+  const sphere = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.5 }).arrays();
   const detail = Mesh.fromArrays(sphere.positions, sphere.indices, { warnings: [CORNER] });
   const ellipsoids = [
     {

@@ -44,7 +44,7 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     await version(),
     await paramSpecs('tracking'),
     await parsePoints(new TextEncoder().encode('0 0 0 1 0 0\n1 0 0 0 1 0\n')),
-    await animationGlb([await Mesh.icosphere([0, 0, 0], 1, 1)], { frameSeconds: 1 }),
+    await animationGlb([await Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 })], { frameSeconds: 1 }),
   ],
   volume: async ({ Volume }) => {
     const made = new Volume({ data, dims: DIMS, spacing: [1, 1, 2], slope: 2, space: 'LPS' });
@@ -53,7 +53,7 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     const { dims, frames, frameSeconds, spacing, affine, space, unit, range } = several;
     return [
       await Promise.all([dims, frames, frameSeconds, spacing, affine, space, unit, range]),
-      await Promise.all([several.histogram(4, 1), several.sample([1, 2, 3]), several.slice(2, 12)]),
+      await Promise.all([several.histogram({ bins: 4, frame: 1 }), several.sample([1, 2, 3]), several.slice(2, 12)]),
       await several.intensities(1),
       await made.toNifti(),
       await Promise.all((await volume.pyramid(3)).map((level) => level.intensities())),
@@ -71,13 +71,13 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
       await Promise.all([map.labels(), map.range, map.dice(other), map.dice(other, { label: 2 })]),
       await (await map.label([2, 4])).intensities(),
       await (await map.threshold(1, 3)).intensities(),
-      await (await map.resample({ like: part }, 'nearest')).intensities(),
+      await (await map.resample({ like: part, interpolation: 'nearest' })).intensities(),
       await (await part.resample({ dims: [5, 6, 7] })).intensities(),
       await (await map.frame(0)).toBytes('nrrd', { gzip: true }),
     ];
   },
   mesh: async ({ Mesh, Volume }) => {
-    const ball = await Mesh.icosphere([0, 0, 0], 1, 0.4);
+    const ball = await Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.4 });
     const { positions, indices } = await ball.arrays();
     const uvs = Float32Array.from({ length: (2 * positions.length) / 3 }, (_, i) => (i % 7) / 7);
     const textured = await Mesh.fromArrays(positions, indices, { uvs });
@@ -110,7 +110,7 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     ];
   },
   deformable: async ({ DeformableModel, Mesh, Volume }) => {
-    const start = await Mesh.icosphere([12, 12, 12], 3, 2);
+    const start = await Mesh.icosphere({ center: [12, 12, 12], radius: 3, maxEdge: 2 });
     const volume = new Volume({ data, dims: DIMS });
     const model = new DeformableModel({ volume, start, levels: 1, params: PARAMS });
     const heard: number[] = [];
@@ -241,7 +241,7 @@ test('two hundred steps give the same bits as the native core', { tags: ['long']
 test('all names of the package are exported, and objects have no other members', async () => {
   const names = Object.keys(vesicle).filter((name) => name !== 'initSync');
   expect(Object.keys(worker).sort()).toEqual([...names, 'terminate', 'transfer'].sort());
-  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
+  const mesh = await worker.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 });
   expect(mesh).toBeInstanceOf(worker.Mesh);
   expect(mesh.constructor.name).toBe('Mesh');
   expect(wrong(mesh).then).toBeUndefined();
@@ -249,7 +249,7 @@ test('all names of the package are exported, and objects have no other members',
 });
 
 test('errors arrive as VesicleErrors with code and message', async () => {
-  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
+  const mesh = await worker.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 });
   const refused = await rejection(mesh.decimate(-1));
   expect([refused.code, refused.message.slice(0, 15), refused.name]).toEqual([
     'invalid-argument',
@@ -359,7 +359,7 @@ test('during a run parameters can change, and other calls are refused', async ()
 });
 
 test('operations of meshes in slices are aborted, and refuse other changes meanwhile', async () => {
-  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 0.03);
+  const mesh = await worker.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.03 });
   const before = await mesh.arrays();
   const abort = new AbortController();
   const slices = mesh.inSlices({ signal: abort.signal, budgetMs: 1e-6 });
@@ -376,7 +376,7 @@ test('operations of meshes in slices are aborted, and refuse other changes meanw
 });
 
 test('a multiresolution model is created in slices, and the creation is aborted', async () => {
-  const detail = await worker.Mesh.icosphere([0, 0, 0], 1, 0.05);
+  const detail = await worker.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.05 });
   const stop = new AbortController();
   const work = worker.MultiresolutionModel.create({ detail }, { signal: stop.signal, budgetMs: 1e-6 });
   stop.abort('enough');
@@ -439,7 +439,7 @@ test('results are transferred', async () => {
 });
 
 test('copyTo reuses the same memory if it is large enough', async () => {
-  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 0.5);
+  const mesh = await worker.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 0.5 });
   const { positions, normals, indices } = await mesh.arrays();
   const out = { positions: new Float32Array(9999), normals: new Float32Array(), indices: new Uint32Array(9999) };
   const before = out.positions;
@@ -547,7 +547,7 @@ async function crashOf(promise: Promise<unknown>): Promise<string> {
 test('a crash of the module rejects all calls, until init starts a new worker', async () => {
   worker.terminate();
   await init({ worker: hostOf(FAULTY) });
-  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
+  const mesh = await worker.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 });
   const run = restless().run();
   const [crash, waiting] = await Promise.all([crashOf(mesh.info()), crashOf(run)]);
   expect(crash).toMatch(/^unreachable\. This is a fault in vesicle/);
@@ -557,13 +557,13 @@ test('a crash of the module rejects all calls, until init starts a new worker', 
   await init();
   expect((await rejection(mesh.info())).message).toContain('was lost');
   mesh.free();
-  expect((await (await worker.Mesh.icosphere([0, 0, 0], 1, 1)).info()).genus).toBe(0);
+  expect((await (await worker.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 })).info()).genus).toBe(0);
 });
 
 test('a worker that exits by itself rejects all pending calls', async () => {
   worker.terminate();
   await init({ worker: hostOf(FAULTY) });
-  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 1);
+  const mesh = await worker.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 });
   // Whether the answer still arrives depends on the system.
   const check = mesh.check().catch(() => undefined);
   expect(await crashOf(restless().run())).toContain('no more');
@@ -612,10 +612,10 @@ function node(script: string, ...flags: string[]): string {
 test('calls before init say what to do, and an idle worker keeps no process alive', () => {
   const script = `
     import init, { Mesh, Volume, version } from './pkg/worker.js';
-    for (const early of [version(), Mesh.icosphere([0, 0, 0], 1, 1), new Volume({}).dims, new Volume({}).dims])
+    for (const early of [version(), Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 }), new Volume({}).dims, new Volume({}).dims])
       await early.catch(({ code, message }) => console.log(code, message.includes('await init()')));
     await init();
-    const mesh = await Mesh.icosphere([0, 0, 0], 1, 1);
+    const mesh = await Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 });
     console.log((await mesh.info()).genus);`;
   expect(node(script).split('\n')).toEqual([...Array(4).fill('invalid-argument true'), '0']);
 });
@@ -643,11 +643,11 @@ test('unreachable objects are freed in the worker, those in use are not', () => 
     };
     await init({ worker });
     const data = Uint8Array.from({ length: 4096 }, (_, i) => (i % 16 > 4 && i % 16 < 12 ? 100 : 0));
-    const held = await Mesh.icosphere([0, 0, 0], 1, 1);
+    const held = await Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 });
     const { mesh } = new DeformableModel({ volume: new Volume({ data, dims: [16, 16, 16] }), params: { iso: 50 } });
     const steps = (model) => model.run({ maxIterations: 50 });
     const run = steps(new DeformableModel({ volume: new Volume({ data, dims: [16, 16, 16] }), params: { iso: 50 } }));
-    await (async () => { for (let i = 0; i < 20; i++) await Mesh.icosphere([0, 0, 0], 1, 1); })();
+    await (async () => { for (let i = 0; i < 20; i++) await Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 }); })();
     // The two volumes and twenty meshes; the engine decides when.
     while (freed.size < 22) { gc(); await new Promise((resolve) => setTimeout(resolve)); }
     const { iteration } = await run;
@@ -660,7 +660,7 @@ test('unreachable objects are freed in the worker, those in use are not', () => 
 
 test('many calls with one signal have one listener, and all are aborted', async () => {
   const stop = new AbortController();
-  const mesh = await worker.Mesh.icosphere([0, 0, 0], 1, 4);
+  const mesh = await worker.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 4 });
   const slices = mesh.inSlices({ signal: stop.signal, budgetMs: 1e-6 });
   const calls = Array.from({ length: 12 }, () => slices.distanceTo(mesh).catch((reason: unknown) => reason));
   expect(getEventListeners(stop.signal, 'abort')).toHaveLength(1);

@@ -41,9 +41,7 @@ export function programOf(
     if (!isBall(origin)) inputs.push(['file' in origin ? origin.file : `${stem}.obj`, mesh]);
     if (texture) inputs.push([text('sculpt.textureFile', { type: texture.slice('image/'.length) }), 'picture']);
     const options = texture ? `, { texture: { type: ${literal(texture)}, bytes: picture } }` : '';
-    const made = isBall(origin)
-      ? `icosphere(${BALL.map(literal).join(', ')})`
-      : `parse(${bytesFor(mesh, origin)}${options})`;
+    const made = isBall(origin) ? `icosphere(${literal(BALL)})` : `parse(${bytesFor(mesh, origin)}${options})`;
     given += `${mesh}: Mesh.${made}, `;
   }
   const [files, parameters] = [inputs.map(([file]) => file), inputs.map(([, parameter]) => parameter)];

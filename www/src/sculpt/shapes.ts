@@ -1,5 +1,5 @@
 /** Computes the meshes of examples that have no mesh file. Used by the worker only. */
-import { Mesh, type MeshTexture } from 'vesicle';
+import { type Icosphere, Mesh, type MeshTexture } from 'vesicle';
 import startReaders, { parseMesh } from 'vesicle/import';
 import { withoutCompression } from '../worker/gltf';
 import { drawnMap } from './map';
@@ -7,8 +7,8 @@ import type { NamedBytes } from './protocol';
 
 export type ComputedMesh = 'globe' | 'ball';
 
-/** Arguments of `Mesh.icosphere` for the ball. */
-export const BALL = [[0, 0, 0], 1, 0.08] as const satisfies Parameters<typeof Mesh.icosphere>;
+/** The ball, for `Mesh.icosphere`. */
+export const BALL: Icosphere = { center: [0, 0, 0], radius: 1, maxEdge: 0.08 };
 /** Number of meridians of the globe's mesh. */
 const MERIDIANS = 96;
 /** Number of circles of latitude of the globe's mesh, without the poles. */
@@ -22,7 +22,7 @@ export async function computedMesh(shape: ComputedMesh): Promise<Mesh> {
 
 /** Returns a computed mesh without its texture; tests use it where no texture can be drawn. */
 export async function plainMesh(shape: ComputedMesh): Promise<Mesh> {
-  return shape === 'ball' ? Mesh.icosphere([...BALL[0]], BALL[1], BALL[2]) : readMesh(globeAsObj());
+  return shape === 'ball' ? Mesh.icosphere(BALL) : readMesh(globeAsObj());
 }
 
 /** Reads a mesh from the bytes of a file, with the image of its texture and the files beside it, if these are its own. */

@@ -81,7 +81,7 @@ export function stagesOf(kind: StageKind): Stage[] {
 
 /** Returns a ball whose cap was pulled out and narrowed: its neck has long thin triangles, its tip short edges. */
 function pulledBall(): Mesh {
-  const ball = Mesh.icosphere([0, 0, 0], 1, EDGE);
+  const ball = Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: EDGE });
   const { positions, indices } = ball.arrays();
   ball.free();
   for (let i = 0; i < positions.length; i += 3) {

@@ -28,7 +28,7 @@ export function startOf({ start }: Setup, iso: number): Options['start'] {
 /** Returns the options of the model of a set-up; if that has no iso value, one is chosen from the histogram of `volume`. */
 export function modelOptions(volume: Volume, setup: Setup, isSmall = false) {
   const chosen = setup.params.iso;
-  const iso = typeof chosen === 'number' ? chosen : otsu(volume.histogram(HISTOGRAM_BINS), volume.range);
+  const iso = typeof chosen === 'number' ? chosen : otsu(volume.histogram({ bins: HISTOGRAM_BINS }), volume.range);
   return {
     start: startOf(setup, iso),
     levels: setup.levels,

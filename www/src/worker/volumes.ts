@@ -163,7 +163,7 @@ export function displayOf(source: object): Pick<VolumeView, 'inverted' | 'remark
  */
 export function viewOf(volume: Volume, name: string, voxels = intensitiesOf(volume)): VolumeView {
   const { range } = volume;
-  const histogram = volume.histogram(HISTOGRAM_BINS);
+  const histogram = volume.histogram({ bins: HISTOGRAM_BINS });
   // Quantiles, because a few extreme voxels (metal, noise) must not make all others grey.
   const [low = range[0], high = range[1]] = quantiles(histogram, range, [0.001, 0.999]);
   const window: [number, number] = high > low ? [low, high] : range;
