@@ -4,7 +4,7 @@ import { readFile, writeFile } from 'node:fs/promises';
 import init, { Mesh, MultiresolutionModel } from '../pkg/index.js';
 import { at, say, script } from './shell.mjs';
 
-/** Ellipsoids of crown, head, neck and chest, as in www/src/sculpt/examples. */
+/** Ellipsoids of crown, head, neck and chest, as in www/src/labs/sculpt/examples. */
 const ELLIPSOIDS = [
   {
     center: [0, 125, 0],

@@ -140,10 +140,10 @@ function newestFonts(): Plugin {
 
 /** Methods by the worker that runs them. */
 const METHODS = new Map([
-  [here('src/worker.ts'), 'deformable'],
-  [here('src/reconstruct/worker.ts'), 'implicit'],
-  [here('src/track/worker.ts'), 'tracking'],
-  [here('src/sculpt/worker.ts'), 'multires'],
+  [here('src/labs/extract/worker.ts'), 'deformable'],
+  [here('src/labs/reconstruct/worker.ts'), 'implicit'],
+  [here('src/labs/track/worker.ts'), 'tracking'],
+  [here('src/labs/sculpt/worker.ts'), 'multires'],
 ]);
 
 /**
@@ -164,7 +164,7 @@ function ownMethod(): Plugin {
 
 /** The Extract lab's worker has a policy of its own, which servers choose by its name. */
 const nameWorker = ({ facadeModuleId }: Rolldown.PreRenderedChunk) =>
-  `assets/${facadeModuleId === here('src/worker.ts') ? EXTRACT_WORKER : '[name]'}-[hash].js`;
+  `assets/${facadeModuleId === here('src/labs/extract/worker.ts') ? EXTRACT_WORKER : '[name]'}-[hash].js`;
 
 /** For the notices beside the page. */
 const noted = noteBundled('app', [...DECODERS.map(([decoder]) => `@cornerstonejs/${decoder}`), 'draco3dgltf']);

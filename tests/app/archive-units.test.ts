@@ -1,7 +1,7 @@
 /** Archives as they are not made by any program that packs files. */
 import { strToU8, zipSync } from 'three/addons/libs/fflate.module.js';
 import { expect, test } from 'vitest';
-import { ArchiveTooLarge, MOST_FILES, unpack } from '../../www/src/archive';
+import { ArchiveTooLarge, MOST_FILES, unpack } from '../../www/src/kit/archive';
 
 const MOST = 1e9;
 const unpacked = (archive: Uint8Array, most = MOST) => unpack(archive, most, 'too large');

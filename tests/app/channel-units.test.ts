@@ -1,6 +1,6 @@
 // A worker begins when the one before has ended, so that their memory is not taken at the same time.
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
-import { Channel } from '../../www/src/channel';
+import { Channel } from '../../www/src/engine/channel';
 
 type Requests = { open: { body: string; reply: string } };
 interface Message {

@@ -1,8 +1,8 @@
 /** Tables as spreadsheets open them. */
 import { expect, test } from 'vitest';
-import { csvOf } from '../../www/src/csv';
-import { toCsv } from '../../www/src/labs/csv';
-import type { StepReport } from '../../www/src/protocol';
+import type { StepReport } from '../../www/src/engine/protocol';
+import { csvOf } from '../../www/src/kit/csv';
+import { toCsv } from '../../www/src/lab/run-table';
 
 test('numbers stay numbers, texts are quoted, and none is a formula', () => {
   const texts = [

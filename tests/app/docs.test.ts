@@ -4,11 +4,11 @@ import { readdir, readFile } from 'node:fs/promises';
 import { dirname, join, relative } from 'node:path';
 import { beforeAll, expect, test } from 'vitest';
 import { at } from '../../scripts/shell.mjs';
-import { exampleById } from '../../www/src/presets';
-import { cloudById } from '../../www/src/reconstruct/presets';
-import { sceneById } from '../../www/src/sculpt/presets';
-import { segmentExampleById } from '../../www/src/segment/examples';
-import { imageById } from '../../www/src/track/presets';
+import { exampleById } from '../../www/src/labs/extract/presets';
+import { cloudById } from '../../www/src/labs/reconstruct/presets';
+import { sceneById } from '../../www/src/labs/sculpt/presets';
+import { segmentExampleById } from '../../www/src/labs/segment/examples';
+import { imageById } from '../../www/src/labs/track/presets';
 
 const DOCS = at('dist/docs');
 const LABS: Record<string, (id: string) => { id: string } | undefined> = {

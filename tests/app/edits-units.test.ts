@@ -6,11 +6,11 @@ import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import init, { Mesh, Volume } from 'vesicle';
 import { beforeAll, expect, test } from 'vitest';
-import { apply, callOf, toCode } from '../../www/src/finish/code';
+import { apply, callOf, toCode } from '../../www/src/engine/edits';
+import type { Edit } from '../../www/src/engine/protocol';
+import { uniform } from '../../www/src/engine/random';
 import { distancesBetween, gridAround, summary } from '../../www/src/finish/distances';
-import type { Edit } from '../../www/src/finish/protocol';
 import { checkSize } from '../../www/src/finish/size';
-import { uniform } from '../../www/src/random';
 
 beforeAll(async () => {
   await init();

@@ -2,7 +2,7 @@
 import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
-import type { Vec3 } from '../../www/src/protocol';
+import type { Vec3 } from '../../www/src/engine/protocol';
 import { type App, afterRun, drop, openApp, reach } from './browser';
 import { asText, ballPoints, FAR } from './far';
 import { difference } from './pixels';

@@ -1,5 +1,5 @@
 /** Data far from the origin of world space, as surveys have them, for tests. */
-import type { Vec3 } from '../../www/src/protocol';
+import type { Vec3 } from '../../www/src/engine/protocol';
 
 /** Metres in a zone of the Universal Transverse Mercator: between two of these, single precision is half a metre. */
 export const FAR: Vec3 = [500_000.123, 5_405_590.456, 350.789];

@@ -2,9 +2,9 @@ import { readFile } from 'node:fs/promises';
 import { expect } from 'vitest';
 import { DeformableModel, type StepReport, Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
-import type { Example } from '../../www/src/examples';
-import { type Outcome, PRESETS, type Preset, type Variant } from '../../www/src/presets';
-import { shapeVoxels } from '../../www/src/shapes';
+import { shapeVoxels } from '../../www/src/engine/shapes';
+import type { Example } from '../../www/src/labs/extract/examples';
+import { type Outcome, PRESETS, type Preset, type Variant } from '../../www/src/labs/extract/presets';
 
 /** The pictures of all figures of the paper, by their names. */
 export const CASES = PRESETS.flatMap((preset) =>

@@ -1,7 +1,7 @@
 /** Scale bars of pictures, and plots as SVG, without a browser. */
 import { describe, expect, test } from 'vitest';
-import { type PlotDrawing, plotSvg } from '../../www/src/ui/plot-svg';
-import { barLength } from '../../www/src/view/scale-bar';
+import { type PlotDrawing, plotSvg } from '../../www/src/kit/plot-svg';
+import { barLength } from '../../www/src/scene/scale-bar';
 
 describe('a scale bar', () => {
   test.each([

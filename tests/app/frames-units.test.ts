@@ -1,8 +1,8 @@
 /** Buffers and simplified surfaces for rendering, without a browser. */
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
-import { type FineMesh, simplifiedIndices } from '../../www/src/view/simplify';
-import { capacityFor, copySurface, emptyArrays } from '../../www/src/worker/surface-buffers';
+import { capacityFor, copySurface, emptyArrays } from '../../www/src/engine/surface-buffers';
+import { type FineMesh, simplifiedIndices } from '../../www/src/scene/simplify';
 
 beforeAll(() => init());
 

@@ -1,7 +1,7 @@
 /** The Extract lab beyond running: views, attractors, comparisons, undo, links. */
 import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
-import { PRESETS } from '../../www/src/presets';
+import { PRESETS } from '../../www/src/labs/extract/presets';
 import { type App, iteration, measures, openApp, reach } from './browser';
 import { LONG } from './long';
 import { changes, showsAgain } from './pixels';

@@ -2,18 +2,18 @@
 import { readdirSync, readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import { describe, expect, test } from 'vitest';
-import { EXAMPLES } from '../../www/src/examples';
+import { EXAMPLES } from '../../www/src/labs/extract/examples';
+import { PRESETS } from '../../www/src/labs/extract/presets';
+import { CLOUDS } from '../../www/src/labs/reconstruct/examples';
+import { CLOUD_PRESETS } from '../../www/src/labs/reconstruct/presets';
+import { SCENES } from '../../www/src/labs/sculpt/examples';
+import { SCULPT_PRESETS } from '../../www/src/labs/sculpt/presets';
+import { IMAGES } from '../../www/src/labs/track/examples';
+import { TRACK_PRESETS } from '../../www/src/labs/track/presets';
 import { type Check, checkProblem, holds, type Operand, unmetPart } from '../../www/src/lessons/check';
 import { type LessonFiles, parseLesson } from '../../www/src/lessons/lesson';
 import { isAnswered, isComplete, type Progress } from '../../www/src/lessons/progress';
 import type { LabReading } from '../../www/src/lessons/reading';
-import { PRESETS } from '../../www/src/presets';
-import { CLOUDS } from '../../www/src/reconstruct/examples';
-import { CLOUD_PRESETS } from '../../www/src/reconstruct/presets';
-import { SCENES } from '../../www/src/sculpt/examples';
-import { SCULPT_PRESETS } from '../../www/src/sculpt/presets';
-import { IMAGES } from '../../www/src/track/examples';
-import { TRACK_PRESETS } from '../../www/src/track/presets';
 
 const FOLDER = fileURLToPath(new URL('../../www/public/lessons/', import.meta.url));
 const OWN: string[] = JSON.parse(readFileSync(`${FOLDER}index.json`, 'utf8'));

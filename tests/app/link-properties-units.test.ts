@@ -1,12 +1,12 @@
 /** Links to all labs, whatever is in them: settings within bounds, or an error in words. */
 import fc from 'fast-check';
 import { describe, expect, test } from 'vitest';
-import * as extract from '../../www/src/labs/link';
-import { LinkError } from '../../www/src/labs/link-query';
-import * as reconstruct from '../../www/src/labs/reconstruct-link';
-import * as sculpt from '../../www/src/labs/sculpt-link';
-import * as segment from '../../www/src/labs/segment-link';
-import * as track from '../../www/src/labs/track-link';
+import { LinkError } from '../../www/src/lab/link-query';
+import * as extract from '../../www/src/labs/extract/link';
+import * as reconstruct from '../../www/src/labs/reconstruct/link';
+import * as sculpt from '../../www/src/labs/sculpt/link';
+import * as segment from '../../www/src/labs/segment/link';
+import * as track from '../../www/src/labs/track/link';
 
 const numRuns = Number(process.env.PROPERTY_RUNS ?? 500);
 

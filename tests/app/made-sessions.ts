@@ -1,7 +1,7 @@
 /** Random sessions of all labs, as the app could have made them. */
 import fc, { type Arbitrary } from 'fast-check';
-import { shortName } from '../../www/src/segment/labels';
-import type { NewSession, SourceFile } from '../../www/src/session/file';
+import { shortName } from '../../www/src/engine/labels';
+import type { NewSession, SourceFile } from '../../www/src/lab/session/file';
 
 const { constantFrom, nat, record, tuple } = fc;
 const flag = fc.boolean();

@@ -18,7 +18,7 @@ test('a new deployment is used at the next visit, and files of the old one are d
       logLevel: 'error',
       build: { outDir: app.folder, emptyOutDir: true },
       plugins: [
-        { name: 'another', transform: (code, id) => (id.endsWith('www/src/main.ts') ? code + mark : undefined) },
+        { name: 'another', transform: (code, id) => (id.endsWith('www/src/app/main.ts') ? code + mark : undefined) },
       ],
     });
     const fresh = await app.listed();

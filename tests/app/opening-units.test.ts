@@ -1,9 +1,9 @@
 /** Opening data in a lab: what is open after something could be opened in part only. */
 import { expect, test } from 'vitest';
-import { RequestError } from '../../www/src/channel';
-import { LabStates } from '../../www/src/labs/lab-states';
-import { Opening, type Source } from '../../www/src/labs/opening';
-import type { Session } from '../../www/src/session/file';
+import { RequestError } from '../../www/src/engine/channel';
+import { Opening, type Source } from '../../www/src/lab/opening';
+import type { Session } from '../../www/src/lab/session/file';
+import { LabStates } from '../../www/src/lab/states';
 
 type Example = { id: string };
 type Linked = { example?: string };

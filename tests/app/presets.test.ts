@@ -1,7 +1,7 @@
 /** The figures of the paper: results are as the page says. Run with the package in Node, which gives the same bits. */
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
-import { PRESETS } from '../../www/src/presets';
+import { PRESETS } from '../../www/src/labs/extract/presets';
 import { CASES, expectOutcome, figure, outcomeOf, volumeOf } from './figure-runs';
 import { LONG } from './long';
 

@@ -1,10 +1,10 @@
 /** Links and sessions of the Reconstruct lab from before parameters were chosen from the points. */
 import { expect, test } from 'vitest';
-import { fromHash, linkOf, toHash } from '../../www/src/labs/reconstruct-link';
-import { completed } from '../../www/src/reconstruct/before';
-import { CLOUDS, PAPER } from '../../www/src/reconstruct/examples';
-import type { ParamValues } from '../../www/src/reconstruct/protocol';
-import type { ContentOf } from '../../www/src/session/schema';
+import type { ContentOf } from '../../www/src/lab/session/schema';
+import { completed } from '../../www/src/labs/reconstruct/before';
+import { CLOUDS, PAPER } from '../../www/src/labs/reconstruct/examples';
+import { fromHash, linkOf, toHash } from '../../www/src/labs/reconstruct/link';
+import type { ParamValues } from '../../www/src/labs/reconstruct/protocol';
 
 const NONE = { added: [], removed: [], outside: [] };
 

@@ -6,10 +6,10 @@ import { readFile } from 'node:fs/promises';
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { type Camera, ImplicitSurface, paramSpecs, parsePoints } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
-import { computedCloud } from '../../www/src/reconstruct/clouds';
-import { CLOUDS, type CloudExample } from '../../www/src/reconstruct/examples';
-import { phi } from '../../www/src/reconstruct/kernel';
-import { distances } from '../../www/src/reconstruct/nearest';
+import { computedCloud } from '../../www/src/labs/reconstruct/clouds';
+import { CLOUDS, type CloudExample } from '../../www/src/labs/reconstruct/examples';
+import { phi } from '../../www/src/labs/reconstruct/kernel';
+import { distances } from '../../www/src/labs/reconstruct/nearest';
 import {
   CLOUD_PRESETS,
   type CloudOutcome,
@@ -17,7 +17,7 @@ import {
   type CloudVariant,
   type Count,
   variantInForce,
-} from '../../www/src/reconstruct/presets';
+} from '../../www/src/labs/reconstruct/presets';
 import { LONG } from './long';
 
 beforeAll(() => init());

@@ -3,7 +3,7 @@ import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
-import { computedCloud } from '../../www/src/reconstruct/clouds';
+import { computedCloud } from '../../www/src/labs/reconstruct/clouds';
 import {
   type App,
   afterRun,

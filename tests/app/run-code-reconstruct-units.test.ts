@@ -1,16 +1,23 @@
 /** Runs of the Reconstruct lab's worker are repeated, to the same bits, by the code that the worker writes of them. */
 import { expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
-import { apply } from '../../www/src/finish/code';
-import type { Edit } from '../../www/src/finish/protocol';
-import { uniform } from '../../www/src/random';
-import type { CameraView, CloudSource, Edits, ParamValues, Requests, Setup } from '../../www/src/reconstruct/protocol';
-import { literal } from '../../www/src/worker/literal';
+import { apply } from '../../www/src/engine/edits';
+import { literal } from '../../www/src/engine/literal';
+import type { Edit } from '../../www/src/engine/protocol';
+import { uniform } from '../../www/src/engine/random';
+import type {
+  CameraView,
+  CloudSource,
+  Edits,
+  ParamValues,
+  Requests,
+  Setup,
+} from '../../www/src/labs/reconstruct/protocol';
 import { asText, ballPoints, FAR } from './far';
 import { pickFrom, programsIn } from './run-code';
 import { startWorker } from './worker-in-node';
 
-const worker = await startWorker<Requests>(() => import('../../www/src/reconstruct/worker'));
+const worker = await startWorker<Requests>(() => import('../../www/src/labs/reconstruct/worker'));
 await worker.request('hello', undefined);
 
 await init();

@@ -2,10 +2,11 @@
 import { expect, test } from 'vitest';
 import { decompressGltf } from '../../pkg/gltf/index.js';
 import init, { Mesh, MultiresolutionModel } from '../../pkg/index.js';
-import { uniform } from '../../www/src/random';
-import { originsOf, programOf } from '../../www/src/sculpt/code';
-import { ball, moved, turned, withLengths } from '../../www/src/sculpt/ellipsoids';
-import type { Film } from '../../www/src/sculpt/film';
+import { toCode } from '../../www/src/engine/code';
+import { uniform } from '../../www/src/engine/random';
+import { originsOf, programOf } from '../../www/src/labs/sculpt/code';
+import { ball, moved, turned, withLengths } from '../../www/src/labs/sculpt/ellipsoids';
+import type { Film } from '../../www/src/labs/sculpt/film';
 import type {
   FrameEvent,
   Pose,
@@ -14,9 +15,8 @@ import type {
   SavedPose,
   SceneSource,
   Support,
-} from '../../www/src/sculpt/protocol';
-import { globeAsObj } from '../../www/src/sculpt/shapes';
-import { toCode } from '../../www/src/worker/code';
+} from '../../www/src/labs/sculpt/protocol';
+import { globeAsObj } from '../../www/src/labs/sculpt/shapes';
 import { dracoGlb, dracoStream, ball as roundMesh } from '../js/made-gltf';
 import { LONG } from './long';
 import { pickFrom, programsIn } from './run-code';
@@ -27,7 +27,7 @@ let heard: () => void = () => undefined;
 let state = 'paused';
 let last: FrameEvent | undefined;
 const worker = await startWorker<Requests>(
-  () => import('../../www/src/sculpt/worker'),
+  () => import('../../www/src/labs/sculpt/worker'),
   (event) => {
     if ('serial' in event) {
       last = event as FrameEvent;

@@ -1,14 +1,21 @@
 /** Runs of the Track lab's worker are repeated, to the same bits, by the code that the worker writes of them. */
 import { expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
-import { uniform } from '../../www/src/random';
-import { cineVoxels } from '../../www/src/track/cine';
-import type { CineSpec, ImageSource, ParamValues, Requests, SavedTrack, Setup } from '../../www/src/track/protocol';
+import { uniform } from '../../www/src/engine/random';
+import { cineVoxels } from '../../www/src/labs/track/cine';
+import type {
+  CineSpec,
+  ImageSource,
+  ParamValues,
+  Requests,
+  SavedTrack,
+  Setup,
+} from '../../www/src/labs/track/protocol';
 import { LONG } from './long';
 import { pickFrom, programsIn } from './run-code';
 import { startWorker } from './worker-in-node';
 
-const worker = await startWorker<Requests>(() => import('../../www/src/track/worker'));
+const worker = await startWorker<Requests>(() => import('../../www/src/labs/track/worker'));
 await worker.request('hello', undefined);
 
 await init();

@@ -4,18 +4,18 @@ import { dirname, join } from 'node:path';
 import { describe, expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
-import type { Attractor, Requests, SavedRun, Setup, StartShape, VolumeSource } from '../../www/src/protocol';
-import { uniform } from '../../www/src/random';
-import { bytesOf, callsOf, type Program, toCode } from '../../www/src/worker/code';
-import { programOf } from '../../www/src/worker/extract-code';
-import { literal } from '../../www/src/worker/literal';
+import { bytesOf, callsOf, type Program, toCode } from '../../www/src/engine/code';
+import { literal } from '../../www/src/engine/literal';
+import type { Attractor, Requests, SavedRun, Setup, StartShape, VolumeSource } from '../../www/src/engine/protocol';
+import { uniform } from '../../www/src/engine/random';
+import { programOf } from '../../www/src/labs/extract/code';
 import { filesOf, serveImage, zipOf } from '../js/zarr-stores';
 import { LONG } from './long';
 import { pickFrom, programsIn } from './run-code';
 import { ball, ring } from './volumes';
 import { startWorker } from './worker-in-node';
 
-const worker = await startWorker<Requests>(() => import('../../www/src/worker'));
+const worker = await startWorker<Requests>(() => import('../../www/src/labs/extract/worker'));
 await worker.request('hello', undefined);
 
 /** Returns a file with a tooth, of few voxels, and the source that the lab opens. */

@@ -4,7 +4,7 @@ import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { afterAll, expect } from 'vitest';
 import { at, must } from '../../scripts/shell.mjs';
-import type { NamedBytes, RunCode } from '../../www/src/protocol';
+import type { NamedBytes, RunCode } from '../../www/src/engine/protocol';
 
 /** Returns a folder of programs, in which the package is installed, until the end of the test file. */
 export async function programsIn(name: string) {

@@ -6,12 +6,17 @@ import { readFile } from 'node:fs/promises';
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, MultiresolutionModel, paramSpecs } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
-import { type ExampleMesh, SCENES, type SculptExample } from '../../www/src/sculpt/examples';
-import { glide, lastFrame, poseAt } from '../../www/src/sculpt/film';
-import { factsOf } from '../../www/src/sculpt/model';
-import { SCULPT_PRESETS, type SculptPreset, type SculptVariant, variantInForce } from '../../www/src/sculpt/presets';
-import { plainMesh } from '../../www/src/sculpt/shapes';
-import { stagesOf } from '../../www/src/sculpt/stages';
+import { type ExampleMesh, SCENES, type SculptExample } from '../../www/src/labs/sculpt/examples';
+import { glide, lastFrame, poseAt } from '../../www/src/labs/sculpt/film';
+import { factsOf } from '../../www/src/labs/sculpt/model';
+import {
+  SCULPT_PRESETS,
+  type SculptPreset,
+  type SculptVariant,
+  variantInForce,
+} from '../../www/src/labs/sculpt/presets';
+import { plainMesh } from '../../www/src/labs/sculpt/shapes';
+import { stagesOf } from '../../www/src/labs/sculpt/stages';
 import { LONG } from './long';
 
 beforeAll(() => init());

@@ -1,10 +1,9 @@
 /** Parts of the Sculpt lab that need no browser. */
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { type ControlEllipsoid, Mesh, MultiresolutionModel } from '../../pkg/index.js';
-import { DragLatency } from '../../www/src/labs/drag-latency';
-import { SurfaceCarrier } from '../../www/src/labs/sculpt-carrier';
-import { filmOf, fromHash, linkOf, toHash } from '../../www/src/labs/sculpt-link';
-import { deformPoints } from '../../www/src/sculpt/deform';
+import { SurfaceCarrier } from '../../www/src/labs/sculpt/carrier';
+import { deformPoints } from '../../www/src/labs/sculpt/deform';
+import { DragLatency } from '../../www/src/labs/sculpt/drag-latency';
 import {
   ball,
   between,
@@ -16,11 +15,12 @@ import {
   turned,
   turnedAbout,
   upright,
-} from '../../www/src/sculpt/ellipsoids';
-import { SCENES } from '../../www/src/sculpt/examples';
-import { type Film, lastFrame, poseAt } from '../../www/src/sculpt/film';
-import { fitted, principalAxes } from '../../www/src/sculpt/fit';
-import { Preview } from '../../www/src/sculpt/preview';
+} from '../../www/src/labs/sculpt/ellipsoids';
+import { SCENES } from '../../www/src/labs/sculpt/examples';
+import { type Film, lastFrame, poseAt } from '../../www/src/labs/sculpt/film';
+import { fitted, principalAxes } from '../../www/src/labs/sculpt/fit';
+import { filmOf, fromHash, linkOf, toHash } from '../../www/src/labs/sculpt/link';
+import { Preview } from '../../www/src/labs/sculpt/preview';
 
 beforeAll(() => init());
 

@@ -2,10 +2,10 @@
 import { gzipSync } from 'node:zlib';
 import { afterEach, expect, test, vi } from 'vitest';
 import { Volume } from '../../pkg/index.js';
-import type { Requests, Vec3 } from '../../www/src/segment/protocol';
+import type { Requests, Vec3 } from '../../www/src/labs/segment/protocol';
 import { startWorker } from './worker-in-node';
 
-const worker = await startWorker<Requests>(() => import('../../www/src/segment/worker'));
+const worker = await startWorker<Requests>(() => import('../../www/src/labs/segment/worker'));
 await worker.request('hello', undefined);
 afterEach(() => vi.restoreAllMocks());
 

@@ -3,7 +3,7 @@ import { readFile } from 'node:fs/promises';
 import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
-import { labelTooth } from '../../www/src/segment/labelling';
+import { labelTooth } from '../../www/src/labs/segment/labelling';
 import { type App, anotherPage, drop, openApp, overflow, reach, recordStates, unnamedControls } from './browser';
 import { LONG } from './long';
 import { dicomSeries } from './pictures';

@@ -5,14 +5,14 @@
 import fc from 'fast-check';
 import { strFromU8, strToU8, unzipSync, zipSync } from 'three/addons/libs/fflate.module.js';
 import { assert, expect, test } from 'vitest';
-import { ArchiveTooLarge } from '../../www/src/archive';
-import { unpackTrack } from '../../www/src/labs/track-session';
-import { lastFrame, poseAt } from '../../www/src/sculpt/film';
-import { readSession, type Session, writeSession } from '../../www/src/session/file';
-import { unpackMoments } from '../../www/src/session/moments';
-import type { ContentOf } from '../../www/src/session/schema';
-import { crossSection } from '../../www/src/track/cross-section';
-import { History } from '../../www/src/ui/history';
+import { ArchiveTooLarge } from '../../www/src/kit/archive';
+import { History } from '../../www/src/kit/history';
+import { readSession, type Session, writeSession } from '../../www/src/lab/session/file';
+import { unpackMoments } from '../../www/src/lab/session/moments';
+import type { ContentOf } from '../../www/src/lab/session/schema';
+import { lastFrame, poseAt } from '../../www/src/labs/sculpt/film';
+import { unpackTrack } from '../../www/src/labs/track/session';
+import { crossSection } from '../../www/src/scene/cross-section';
 import { anySession } from './made-sessions';
 
 const RUNS = Number(process.env.PROPERTY_RUNS ?? 100);

@@ -3,8 +3,8 @@ import { readFile } from 'node:fs/promises';
 import { strFromU8, strToU8, unzipSync, type Zippable, zipSync } from 'three/addons/libs/fflate.module.js';
 import { describe, expect, test } from 'vitest';
 import { at } from '../../scripts/shell.mjs';
-import { describe as describeFiles, matching, readSession, writeSession } from '../../www/src/session/file';
-import { isSession } from '../../www/src/session/recognise';
+import { isSession } from '../../www/src/importers/sessions';
+import { describe as describeFiles, matching, readSession, writeSession } from '../../www/src/lab/session/file';
 
 const BYTES = Uint8Array.from({ length: 1000 }, (_, i) => i * i);
 const MOMENT = {

@@ -1,8 +1,8 @@
 // Sessions are packed in slices, between which the page answers.
 import { unzipSync } from 'three/addons/libs/fflate.module.js';
 import { expect, test, vi } from 'vitest';
-import { writeSession } from '../../www/src/session/file';
-import { zipped } from '../../www/src/session/zip';
+import { writeSession } from '../../www/src/lab/session/file';
+import { zipped } from '../../www/src/lab/session/zip';
 
 const file = (name: string, length: number, compressed: boolean) => {
   return { name, bytes: Uint8Array.from({ length }, (_, i) => i >> 4), compressed };

@@ -5,8 +5,8 @@ import { unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
-import { readSession } from '../../www/src/session/file';
-import { contentOf } from '../../www/src/session/recognise';
+import { contentOf } from '../../www/src/lab/session/content';
+import { readSession } from '../../www/src/lab/session/file';
 import { type App, afterRun, drop, open, openApp, QUICK, reach, recordStates, unfold } from './browser';
 import { LONG } from './long';
 

@@ -1,8 +1,8 @@
 // Bounds of data in small files, which may come from anyone.
 import { expect, test } from 'vitest';
-import type { Session } from '../../www/src/session/schema';
-import { isOfSmall, SMALL } from '../../www/src/small-files';
-import { checkPlanes, checkSmallImage } from '../../www/src/worker/volumes';
+import { isOfSmall, SMALL } from '../../www/src/engine/small-files';
+import { checkPlanes, checkSmallImage } from '../../www/src/engine/volumes';
+import type { Session } from '../../www/src/lab/session/schema';
 
 type Dims = [number, number, number];
 

@@ -1,15 +1,15 @@
 // The worker of the Extract lab sends no more voxels than the page needs, and says how a run has failed.
 import { afterEach, expect, test, vi } from 'vitest';
 import { DeformableModel, VesicleError, Volume } from '../../pkg/index.js';
-import type { Requests, Setup, VolumeSource, WorkerEvent } from '../../www/src/protocol';
-import { paintSlice } from '../../www/src/view/slicing';
-import { levelsOf } from '../../www/src/worker/volumes';
+import type { Requests, Setup, VolumeSource, WorkerEvent } from '../../www/src/engine/protocol';
+import { levelsOf } from '../../www/src/engine/volumes';
+import { paintSlice } from '../../www/src/scene/slicing';
 import { ball } from './volumes';
 import { startWorker } from './worker-in-node';
 
 const events: WorkerEvent[] = [];
 const worker = await startWorker<Requests>(
-  () => import('../../www/src/worker'),
+  () => import('../../www/src/labs/extract/worker'),
   (event) => events.push(event as WorkerEvent),
 );
 await worker.request('hello', undefined);

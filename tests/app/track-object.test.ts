@@ -3,8 +3,8 @@ import { readFile } from 'node:fs/promises';
 import type { Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
-import { centreOf, cineVoxels, trueVolume } from '../../www/src/track/cine';
-import type { CineSpec } from '../../www/src/track/protocol';
+import { centreOf, cineVoxels, trueVolume } from '../../www/src/labs/track/cine';
+import type { CineSpec } from '../../www/src/labs/track/protocol';
 import { type App, cancelAtOnce, drop, open, openApp, reach, recordStates } from './browser';
 import { LONG } from './long';
 

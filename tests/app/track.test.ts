@@ -3,7 +3,7 @@ import { readFile } from 'node:fs/promises';
 import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
-import { cineVoxels } from '../../www/src/track/cine';
+import { cineVoxels } from '../../www/src/labs/track/cine';
 import {
   type App,
   anotherPage,

@@ -1,18 +1,18 @@
 /** Parts of the app that are plain functions. */
 import { describe, expect, test } from 'vitest';
-import { EXAMPLES } from '../../www/src/examples';
-import { toCsv } from '../../www/src/labs/csv';
-import { fromHash, linkOf, toHash } from '../../www/src/labs/link';
-import { UndoStack } from '../../www/src/labs/undo';
-import type { StepReport } from '../../www/src/protocol';
-import { quantize } from '../../www/src/quantize';
-import { otsu, quantiles } from '../../www/src/threshold';
-import { lengths } from '../../www/src/ui/format';
-import { History } from '../../www/src/ui/history';
-import { anatomyOf, type Grid, invert, sliceOrientations, slicePlane, toWorld } from '../../www/src/view/anatomy';
-import { componentRoots } from '../../www/src/view/components';
-import { diverging, quantityTitle, robustRange, shadeColors } from '../../www/src/view/shading';
-import { ballSection, levelIndex, paintSlice, projectSegments } from '../../www/src/view/slicing';
+import type { StepReport } from '../../www/src/engine/protocol';
+import { quantize } from '../../www/src/engine/quantize';
+import { otsu, quantiles } from '../../www/src/engine/threshold';
+import { lengths } from '../../www/src/kit/format';
+import { History } from '../../www/src/kit/history';
+import { toCsv } from '../../www/src/lab/run-table';
+import { UndoStack } from '../../www/src/lab/undo';
+import { EXAMPLES } from '../../www/src/labs/extract/examples';
+import { fromHash, linkOf, toHash } from '../../www/src/labs/extract/link';
+import { anatomyOf, type Grid, invert, sliceOrientations, slicePlane, toWorld } from '../../www/src/scene/anatomy';
+import { componentRoots } from '../../www/src/scene/components';
+import { diverging, quantityTitle, robustRange, shadeColors } from '../../www/src/scene/shading';
+import { ballSection, levelIndex, paintSlice, projectSegments } from '../../www/src/scene/slicing';
 
 /** Returns a grid with the given columns as voxel axes. */
 function grid(columns: [number, number, number][], space: 'RAS' | 'LPS' = 'RAS'): Grid {

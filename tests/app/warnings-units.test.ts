@@ -1,11 +1,11 @@
 /** Warnings in what the labs save, and which of them concern what. */
 import init, { Volume } from 'vesicle';
 import { beforeAll, describe, expect, test } from 'vitest';
-import { toCsv } from '../../www/src/labs/csv';
-import { framesCsv } from '../../www/src/labs/track-measures';
-import { History } from '../../www/src/ui/history';
-import { cellOf, concerning, merged, placeText, type Warning } from '../../www/src/warnings';
-import { viewOf } from '../../www/src/worker/volumes';
+import { viewOf } from '../../www/src/engine/volumes';
+import { cellOf, concerning, merged, placeText, type Warning } from '../../www/src/engine/warnings';
+import { History } from '../../www/src/kit/history';
+import { toCsv } from '../../www/src/lab/run-table';
+import { framesCsv } from '../../www/src/labs/track/measures';
 
 const LONG_VOXELS: Warning = { code: 'anisotropic', text: 'Voxels are long, very long.' };
 const ENDS: Warning = { code: 'ends-in-frame', text: 'It ends.', where: { frame: 2 } };

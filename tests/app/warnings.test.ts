@@ -3,8 +3,8 @@ import { readFile, writeFile } from 'node:fs/promises';
 import axe, { type Result } from 'axe-core';
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, test } from 'vitest';
-import { readSession, writeSession } from '../../www/src/session/file';
-import type { Warning } from '../../www/src/warnings';
+import type { Warning } from '../../www/src/engine/warnings';
+import { readSession, writeSession } from '../../www/src/lab/session/file';
 import { type App, drop, open, openApp, QUICK, reach } from './browser';
 import { LONG } from './long';
 

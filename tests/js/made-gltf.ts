@@ -1,4 +1,4 @@
-/// <reference path="untyped.d.ts" />
+/// <reference path="./untyped.d.ts" />
 // Compressed glTF documents, made with the encoders of the libraries that decode them.
 import draco3d from 'draco3dgltf';
 import { MeshoptEncoder } from 'meshoptimizer/encoder';

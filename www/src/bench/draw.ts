@@ -1,5 +1,5 @@
+import { h } from '../kit/dom';
 import { LANGUAGE, text } from '../texts';
-import { h } from '../ui/dom';
 import { scaleOf } from './scale';
 import type { Chart, Section } from './sections';
 import { type Bar, type Figure, formatTarget, meetsTarget, type Target, verdict, withUnit } from './targets';

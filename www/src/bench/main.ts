@@ -1,9 +1,9 @@
 import { text, textNodes } from '../texts';
-import '../style.css';
+import '../kit/style.css';
 import './bench.css';
 import json from '../../../bench.json';
-import { LAB_IDS } from '../labs/address';
-import { h } from '../ui/dom';
+import { h } from '../kit/dom';
+import { LAB_IDS } from '../lab/address';
 import { drawSection, rowOf, scrolling, VERDICTS } from './draw';
 import type { Report } from './report';
 import { type Chart, type Section, sectionsOf } from './sections';

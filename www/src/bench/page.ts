@@ -1,6 +1,7 @@
 /** Benchmarks of the app itself: start-up time, longest task, frame rate and memory. */
+
+import { count } from '../kit/format';
 import { text } from '../texts';
-import { count } from '../ui/format';
 import type { Report } from './report';
 import type { Section } from './sections';
 import { atLeast, atMost, type Figure, shortHost, type Target } from './targets';

@@ -1,6 +1,7 @@
 /** Comparison of this library's measurements with those of other software. */
+
+import { count } from '../kit/format';
 import { text } from '../texts';
-import { count } from '../ui/format';
 import type { PeerRow, Report, Side } from './report';
 import type { Section } from './sections';
 import { type Bar, type Figure, withUnit } from './targets';

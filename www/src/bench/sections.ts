@@ -1,6 +1,7 @@
 /** Selects the measurements of the report that the benchmark page draws, with their units and targets. */
+
+import { count } from '../kit/format';
 import { plural, text } from '../texts';
-import { count } from '../ui/format';
 import { pageSection } from './page';
 import { peerSection } from './peers';
 import type { HeadFigures, Host, Report, SculptRow, StepRow } from './report';

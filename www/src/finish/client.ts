@@ -1,4 +1,4 @@
-import { Channel } from '../channel';
+import { Channel } from '../engine/channel';
 import type { Requests } from './protocol';
 
 const spawn = () => new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle edits' });

@@ -1,9 +1,9 @@
-import { csvOf } from '../csv';
+import { cellOf, type Warning } from '../engine/warnings';
+import { acceptDropsOn, fileChooser, nameOf, readFiles, VOLUME_FILES } from '../importers/files';
+import { csvOf } from '../kit/csv';
+import { h, uniqueId } from '../kit/dom';
+import { figure } from '../kit/format';
 import { text } from '../texts';
-import { h, uniqueId } from '../ui/dom';
-import { acceptDropsOn, fileChooser, nameOf, readFiles, VOLUME_FILES } from '../ui/files';
-import { figure } from '../ui/format';
-import { cellOf, type Warning } from '../warnings';
 import { type Finishing, isCancelled } from './finishing';
 import type { Comparison, Distances } from './protocol';
 

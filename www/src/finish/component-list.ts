@@ -1,8 +1,8 @@
-import type { Unit } from '../examples';
+import type { Unit } from '../engine/protocol';
+import { h } from '../kit/dom';
+import { sized } from '../kit/measures';
+import { componentRoots } from '../scene/components';
 import { plural, text } from '../texts';
-import { h } from '../ui/dom';
-import { sized } from '../ui/measures';
-import { componentRoots } from '../view/components';
 import type { Component, Edited } from './protocol';
 
 /** Largest number of components listed; the smaller ones can still be chosen by click. */

@@ -1,7 +1,7 @@
 /** Distances between two surfaces in each direction, and the grid in which they are compared as solids. */
 import { type Mesh, Volume } from 'vesicle';
-import type { Vec3 } from '../protocol';
-import { triangleArea } from '../worker/triangle-area';
+import type { Vec3 } from '../engine/protocol';
+import { triangleArea } from '../engine/triangle-area';
 import type { Distances } from './protocol';
 
 /** Number of voxels along the longest side of the grid in which the Dice coefficient of two meshes is computed. */

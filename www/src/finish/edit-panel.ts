@@ -1,16 +1,16 @@
-import type { Unit } from '../examples';
-import { shortened } from '../placing';
-import type { ParamSpec, ParamValues, Vec3 } from '../protocol';
+import { callOf, toCode } from '../engine/edits';
+import { shortened } from '../engine/placing';
+import type { Edit, ParamSpec, ParamValues, SurfacePoint, Unit, Vec3 } from '../engine/protocol';
+
+import { h } from '../kit/dom';
+import { download } from '../kit/download';
+import { figure } from '../kit/format';
+import { ParamControls } from '../kit/params';
+import type { EditedView } from '../scene/edited-view';
 import { plural, text } from '../texts';
-import { h } from '../ui/dom';
-import { download } from '../ui/files';
-import { figure } from '../ui/format';
-import { ParamControls } from '../ui/params';
-import { callOf, toCode } from './code';
 import { ComponentList } from './component-list';
-import type { EditedView } from './edited-view';
 import { type Finishing, isCancelled } from './finishing';
-import type { Edit, Edited, SurfacePoint } from './protocol';
+import type { Edited } from './protocol';
 
 /** Name under which the surface before the edits is saved, and the program for them reads it. */
 const INITIAL = 'surface.ply';

@@ -1,5 +1,5 @@
-import { RequestError } from '../channel';
-import type { ExportRequest } from '../protocol';
+import { RequestError } from '../engine/channel';
+import type { ExportRequest } from '../engine/protocol';
 import { text } from '../texts';
 import { FinishClient } from './client';
 import type { Edited, RequestKind, Requests } from './protocol';

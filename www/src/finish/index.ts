@@ -1,15 +1,15 @@
 /** Editing and comparison of a surface after a run, the same in all labs. */
-import type { Unit } from '../examples';
-import type { ExportRequest, Measures, Vec3 } from '../protocol';
+
+import type { Edit, ExportRequest, Measures, Unit, Vec3 } from '../engine/protocol';
+import type { Warning } from '../engine/warnings';
+import { folded } from '../kit/dom';
+import type { MeasurePanel } from '../kit/measures';
+import type { EditedView } from '../scene/edited-view';
 import { text } from '../texts';
-import { folded } from '../ui/dom';
-import type { MeasurePanel } from '../ui/measures';
-import type { Warning } from '../warnings';
 import { ReferencePanel } from './compare-panel';
 import { EditPanel } from './edit-panel';
-import type { EditedView } from './edited-view';
 import { Finishing, isCancelled } from './finishing';
-import type { Edit, Edited } from './protocol';
+import type { Edited } from './protocol';
 import { MOST_OF_SMALL } from './size';
 
 /** Parts of a lab that the tools use. */

@@ -1,15 +1,14 @@
 /** Messages between the page and the worker that edits and compares surfaces after a run. */
-import type { ExportRequest, Measures, NamedBytes, Plane, PointArray, Surface, Vec3 } from '../protocol';
-
-/** One edit of a surface: the name of a method of `Mesh`, and its arguments by name. */
-export type Edit =
-  | { op: 'remesh'; min: number; max: number }
-  | { op: 'decimate'; targetTriangles: number }
-  | { op: 'decimateWithin'; maxDistance: number }
-  | { op: 'smooth'; iterations: number; keepVolume: boolean }
-  | { op: 'keepComponents'; indices: number[] }
-  | { op: 'removeCavities' }
-  | { op: 'cut'; origin: Vec3; normal: Vec3 };
+import type {
+  Edit,
+  ExportRequest,
+  Measures,
+  NamedBytes,
+  Plane,
+  PointArray,
+  Surface,
+  SurfacePoint,
+} from '../engine/protocol';
 
 /** A connected component, in the order of {@link Edited.components}, which is that of `Mesh.components`. */
 export interface Component {
@@ -30,12 +29,6 @@ export interface Edited {
   undoable: boolean;
   /** Edits that were undone last, and can be redone, the next one first. */
   undone: Edit[];
-}
-
-/** A point on the surface, by the index of its triangle. */
-export interface SurfacePoint {
-  triangle: number;
-  point: Vec3;
 }
 
 /** Summary of the distances of points of one surface to another one, world units. */

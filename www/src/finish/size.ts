@@ -1,10 +1,10 @@
 /** The size that edits of a session may give a surface, since a small file may come from anyone. */
 import type { Mesh } from 'vesicle';
+import { callOf } from '../engine/edits';
+import type { Edit } from '../engine/protocol';
+import { Refusal } from '../engine/refusal';
+import { count } from '../kit/format';
 import { text } from '../texts';
-import { count } from '../ui/format';
-import { Refusal } from '../worker/refusal';
-import { callOf } from './code';
-import type { Edit } from './protocol';
 
 /** Most vertices that an edit of a session in a small file may give: with more, the page draws for a second after each. */
 export const MOST_OF_SMALL = 200_000;

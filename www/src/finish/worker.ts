@@ -1,16 +1,16 @@
 /** Worker that edits a surface after a run, and compares it with a reference. */
 import init, { Mesh, Volume } from 'vesicle';
-import { relativeTo } from '../placing';
-import type { NamedBytes } from '../protocol';
+import { apply } from '../engine/edits';
+import { withoutCompression } from '../engine/gltf';
+import { relativeTo } from '../engine/placing';
+import type { Edit, NamedBytes, SurfacePoint } from '../engine/protocol';
+import { Refusal } from '../engine/refusal';
+import { type Handlers, reply, withTransfer } from '../engine/serving';
+import { copySurface, emptyArrays, sectionOf } from '../engine/surface-buffers';
+import { readFiles } from '../engine/volumes';
 import { text } from '../texts';
-import { withoutCompression } from '../worker/gltf';
-import { Refusal } from '../worker/refusal';
-import { type Handlers, reply, withTransfer } from '../worker/serving';
-import { copySurface, emptyArrays, sectionOf } from '../worker/surface-buffers';
-import { readFiles } from '../worker/volumes';
-import { apply } from './code';
 import { distancesBetween, gridAround } from './distances';
-import type { Comparison, Edit, Edited, RequestKind, Requests, SurfacePoint } from './protocol';
+import type { Comparison, Edited, RequestKind, Requests } from './protocol';
 import { checkSize } from './size';
 
 /** Number of triangles in all surfaces that are kept for undo. */

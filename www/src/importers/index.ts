@@ -3,16 +3,17 @@
  * after the user has chosen the volume if there are several. Nothing of DICOM but voxels, geometry and the description of
  * the series gets further than this.
  */
-import type { FileNotes } from '../protocol';
-import { isNamedSession } from '../session/recognise';
-import { areSmall } from '../small-files';
+
+import { groupFiles, isVolumeFile } from '../engine/file-groups';
+import type { FileNotes } from '../engine/protocol';
+import { areSmall } from '../engine/small-files';
+import { hasName, setName } from '../kit/folders';
 import { text } from '../texts';
-import { hasName, setName } from '../ui/folders';
-import { type Chosen, VolumeChoice } from '../ui/volume-choice';
-import { groupFiles, isVolumeFile } from '../worker/file-groups';
 import { ImportClient } from './client';
 import type { Candidate, Listing } from './protocol';
 import { HEAD, isDicom, isTiff } from './recognise';
+import { isNamedSession } from './sessions';
+import { type Chosen, VolumeChoice } from './volume-choice';
 
 /** Which files a lab opens together: one volume, one with its label map, the frames of one, or any. */
 export type Admission = 'volume' | 'labelled' | 'frames' | 'any';

@@ -2,7 +2,7 @@
  * Messages between the page and the worker that reads formats of other programs: it lists what files hold, and writes what
  * the user chooses as files that all labs read.
  */
-import type { NamedBytes, Vec3 } from '../protocol';
+import type { NamedBytes, Vec3 } from '../engine/protocol';
 
 /** A volume that files hold. */
 export interface Candidate {

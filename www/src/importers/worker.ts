@@ -2,12 +2,12 @@
 import init, { Volume, type VolumeInit } from 'vesicle';
 import { type Decoders, type DicomVolume, openDicom } from 'vesicle/dicom';
 import { openTiff } from 'vesicle/tiff';
-import type { FileNotes, NamedBytes } from '../protocol';
-import { type Label, newLabel } from '../segment/labels';
-import { withLabels } from '../segment/slicer';
+import { type Label, newLabel } from '../engine/labels';
+import type { FileNotes, NamedBytes } from '../engine/protocol';
+import { Refusal } from '../engine/refusal';
+import { reply, withTransfer } from '../engine/serving';
+import { withLabels } from '../engine/slicer';
 import { text } from '../texts';
-import { Refusal } from '../worker/refusal';
-import { reply, withTransfer } from '../worker/serving';
 import type { Candidate, Listing, ProgressEvent, Requests } from './protocol';
 import { HEAD, isTiff } from './recognise';
 

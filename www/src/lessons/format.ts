@@ -1,5 +1,5 @@
+import { count, figure } from '../kit/format';
 import { text } from '../texts';
-import { count, figure } from '../ui/format';
 import type { Value } from './reading';
 
 /** Formats a measured value; whole numbers in full, and a dash for an unknown value. */

@@ -1,6 +1,7 @@
 /** Judges answers to questions about a number, as a teacher would: by their value, and with what is wrong about them. */
+
+import { figure } from '../kit/format';
 import { type TextKey, text } from '../texts';
-import { figure } from '../ui/format';
 import { quantityFrom } from './numerals';
 import { PLAIN, unitIn, unitNamed } from './units';
 

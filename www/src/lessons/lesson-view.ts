@@ -1,7 +1,8 @@
 /** An open lesson: one step at a time, with its condition tested against the lab. */
+
+import { h, uniqueId } from '../kit/dom';
+import { download } from '../kit/download';
 import { plural, text } from '../texts';
-import { h, uniqueId } from '../ui/dom';
-import { download } from '../ui/files';
 import { type Check, holds, namesIn, unmetPart } from './check';
 import { shownValue } from './format';
 import type { Lesson, Step } from './lesson';

@@ -1,5 +1,5 @@
 /** A lesson: `lesson.json` and its text in Markdown, as docs/lessons.md describes them to authors. */
-import { labOf } from '../labs/address';
+import { labOf } from '../lab/address';
 import { text } from '../texts';
 import { checkData, checkElements, checkFormulas, checkSteps, checkText } from './bounds';
 import { type Check, checkProblem, type Operand, operandProblem } from './check';

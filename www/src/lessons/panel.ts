@@ -1,9 +1,9 @@
 /** The lessons' panel beside the labs: a list of lessons, or one that is open. */
 import './lessons.css';
-import { LESSON_GUIDE } from '../guides';
+import { acceptDropsOn, fileChooser } from '../importers/files';
+import { h, uniqueId } from '../kit/dom';
+import { LESSON_GUIDE } from '../kit/guides';
 import { LANGUAGE, plural, text, textNodes } from '../texts';
-import { h, uniqueId } from '../ui/dom';
-import { acceptDropsOn, fileChooser } from '../ui/files';
 import { type Lesson, parseLesson } from './lesson';
 import { LessonView } from './lesson-view';
 import { completeSteps, loadProgress } from './progress';

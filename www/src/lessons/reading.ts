@@ -1,5 +1,5 @@
 /** Reads the open lab from its page, as another program would: lessons know nothing else of the labs. */
-import { labOf } from '../labs/address';
+import { labOf } from '../lab/address';
 
 export type Value = number | string | boolean;
 

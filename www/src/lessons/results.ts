@@ -1,6 +1,7 @@
 /** A student's results as one file: a page to read, which contains the same results as JSON. */
+
+import { h } from '../kit/dom';
 import { LANGUAGE, text } from '../texts';
-import { h } from '../ui/dom';
 import { shownValue } from './format';
 import type { Lesson, Step } from './lesson';
 import { completeSteps, isAnswered, isComplete, type Progress } from './progress';

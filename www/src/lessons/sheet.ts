@@ -1,7 +1,7 @@
 /** A lesson as a page to print: for students, with room for answers, or for teachers, with the answers. */
 import './lessons.css';
+import { h } from '../kit/dom';
 import { LANGUAGE, plural, text } from '../texts';
-import { h } from '../ui/dom';
 import { shownValue } from './format';
 import { type Lesson, parseLesson, type Step } from './lesson';
 import { loadProgress, type Progress } from './progress';

@@ -1,6 +1,7 @@
 /** Where lessons come from: the app's own, an address, or files of the user. */
+
+import { readFolders } from '../kit/folders';
 import { text } from '../texts';
-import { readFolders } from '../ui/folders';
 import { filesOf, type LessonFiles } from './lesson';
 
 /** Most bytes of a lesson's archive or file; a larger one is no lesson. */
@@ -52,7 +53,7 @@ const isLessonFile = (name: string) => /(^|\/)(lesson\.json|text\.[\w-]+\.md)$/.
 
 async function unpacked(archive: Blob): Promise<LessonFiles> {
   if (archive.size > MOST_BYTES) throw new Error(text('lessons.archiveTooLarge'));
-  const { unpack } = await import('../archive');
+  const { unpack } = await import('../kit/archive');
   const bytes = new Uint8Array(await archive.arrayBuffer());
   const entries = unpack(bytes, MOST_BYTES, text('lessons.archiveTooLarge'), isLessonFile);
   const read = ([name, file]: [string, Uint8Array]) => [name.replace(/^.*\//, ''), new TextDecoder().decode(file)];

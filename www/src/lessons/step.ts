@@ -1,6 +1,7 @@
 /** The text of a lesson's step as elements, for the panel and the sheet. */
+
+import { h } from '../kit/dom';
 import { text } from '../texts';
-import { h } from '../ui/dom';
 import { PARTS, type Part, type Step } from './lesson';
 import { renderMarkdown } from './markdown';
 

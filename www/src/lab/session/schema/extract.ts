@@ -1,0 +1,51 @@
+/** Sessions of the Extract lab. */
+import { literal, object, optional, picklist, undefined_, variant } from 'valibot';
+import type { StartShape } from '../../../engine/protocol';
+import type { ColorMode } from '../../../kit/view-options';
+import { MOST_ATTRACTORS } from '../../attractors';
+import { call, camera, history, log, placement, reports, session, steps, undoable } from './parts';
+import { bytes, count, flag, list, maybe, oneOf, params, real, vec3 } from './values';
+
+const start = variant('kind', [
+  object({ kind: picklist(['contour', 'enclosing', 'isosurface']) }),
+  object({ kind: literal('bubbles'), count: real }),
+  object({ kind: literal('sphere'), center: vec3, radius: real }),
+]);
+const attractors = list(object({ point: vec3, strength: real, radius: real }), MOST_ATTRACTORS);
+const setup = object({
+  ...{ start, levels: count, edge: maybe(real), params, attractors },
+  box: optional(object({ min: vec3, max: vec3 })),
+});
+const calls = variant('call', [
+  steps,
+  call('setParams', params),
+  call('setAttractors', attractors),
+  call('seed', maybe(undefined_())),
+]);
+const kind = oneOf<StartShape['kind']>({
+  contour: true,
+  enclosing: true,
+  bubbles: true,
+  sphere: true,
+  isosurface: true,
+});
+const moment = {
+  state: bytes,
+  model: object({ levels: count, iteration: count, done: flag, log: maybe(log(setup, calls)) }),
+  page: object({
+    choice: object({ kind, bubbles: real, levels: count, edge: maybe(real), box: optional(real) }),
+    ...{ params, attractors, history },
+  }),
+};
+const color = oneOf<ColorMode>({
+  ...{ plain: true, component: true, speed: true, 'mean curvature': true, 'gaussian curvature': true },
+});
+const view = object({
+  ...{ camera, crosshair: vec3 },
+  options: object({ surface: flag, edges: flag, color, slices: placement }),
+});
+
+export const extract = object({
+  ...{ lab: literal('extract'), ...session },
+  ...{ ...moment, undo: undoable(moment), redo: undoable(moment), reports, view: optional(view) },
+});

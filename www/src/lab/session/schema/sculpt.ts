@@ -1,0 +1,27 @@
+/** Sessions of the Sculpt lab. */
+import { literal, minLength, object, optional, pipe, strictTuple, union, variant } from 'valibot';
+import { call, camera, history, log, reports, session, steps, undoable } from './parts';
+import { color } from './reconstruct';
+import { between, bytes, count, flag, list, maybe, name, oneOf, params, text, vec3 } from './values';
+
+const pose = list(object({ center: vec3, axes: strictTuple([vec3, vec3, vec3]) }), 1000);
+const keys = pipe(list(pose, 1000), minLength(1));
+const film = union([
+  object({ keys, between: between(1, 10_000), loop: flag }),
+  object({ motion: literal('lava'), loop: flag }),
+]);
+const calls = variant('call', [steps, call('setParams', params), call('setEllipsoids', pose)]);
+const support = optional(oneOf({ surface: true, membrane: true }));
+const moment = {
+  state: bytes,
+  model: object({ start: pose, support, iteration: count, frame: count, log: optional(text(100)) }),
+  page: object({ names: list(name, 1000), posed: flag, film: maybe(film), history }),
+};
+const layout = oneOf({ result: true, base: true, pair: true, row: true, levels: true, stages: true });
+const view = object({ camera, options: object({ layout, edges: flag, ellipsoids: flag, color }) });
+
+export const sculpt = object({
+  ...{ lab: literal('sculpt'), ...session },
+  ...{ ...moment, undo: undoable(moment), redo: undoable(moment), reports, view: optional(view) },
+  ...{ params: optional(params, () => ({})), log: optional(log(object({ start: pose, params, support }), calls)) },
+});

@@ -1,0 +1,59 @@
+/** Sessions of the Segment lab. */
+import {
+  check,
+  custom,
+  type InferOutput,
+  literal,
+  maxValue,
+  minValue,
+  number,
+  object,
+  optional,
+  pipe,
+  regex,
+  safeInteger,
+  strictTuple,
+  string,
+} from 'valibot';
+import { type LabelArray, rangeOf } from '../../../engine/labels';
+import { camera, placement, session } from './parts';
+import { bytes, flag, list, name, oneOf, params, real, vec3 } from './values';
+
+const voxels = custom<LabelArray>(
+  (value) => ArrayBuffer.isView(value) && 'BYTES_PER_ELEMENT' in value && !/Float|Big/.test(value.constructor.name),
+);
+const value = pipe(number(), safeInteger());
+const label = object({ value, name, color: pipe(string(), regex(/^#[0-9a-f]{6}$/i)) });
+const range = pipe(
+  strictTuple([real, real]),
+  check(([low, high]) => low <= high),
+);
+const tools = object({
+  tool: oneOf({ navigate: true, brush: true, threshold: true, eraser: true, fill: true }),
+  shape: oneOf({ ball: true, disc: true }),
+  extent: oneOf({ slice: true, box: true }),
+  ...{ radius: real, range, reach: real, inRange: flag, protect: flag },
+});
+const opacity = pipe(number(), minValue(0), maxValue(1));
+const view = object({
+  ...{ camera, crosshair: vec3 },
+  options: object({ edges: flag, outlines: flag, slices: placement, opacity }),
+});
+/** Files may have 4000, and a few may be added. */
+const most = 4500;
+
+export const segment = object({
+  ...{ lab: literal('segment'), ...session },
+  ...{ voxels, state: bytes, labels: list(label, most), active: value, hidden: list(value, most), params },
+  ...{ tools: optional(tools), view: optional(view) },
+});
+
+/** Returns the path of the first field of a session that does not fit the labels and the label map. */
+export function mismatchOf({ voxels, labels, active, hidden }: InferOutput<typeof segment>): string | undefined {
+  const [low, high] = rangeOf(voxels);
+  const values = new Set(labels.map((label) => label.value));
+  const wrong = [...values].some((value) => value === 0 || value < low || value > high);
+  if (labels.length === 0 || values.size < labels.length || wrong) return 'labels';
+  if (!values.has(active)) return 'active';
+  return hidden.every((value) => values.has(value)) ? undefined : 'hidden';
+}

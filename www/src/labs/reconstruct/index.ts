@@ -1,0 +1,216 @@
+import { History } from '../../kit/history';
+import type { LabState } from '../../kit/state';
+import type { OpenInLab } from '../../lab/lab';
+import { contentOf } from '../../lab/session/content';
+import type { ContentOf } from '../../lab/session/schema';
+import { RunLab } from '../../lab/shell';
+import { LabStates } from '../../lab/states';
+import { text } from '../../texts';
+import { completed } from './before';
+import { ReconstructClient } from './client';
+import type { CloudExample } from './examples';
+import { fits, linkOf, photoFor, toHash } from './link';
+import { type CloudOrigin, type OpenedCloud, ReconstructOpening } from './opening';
+import { type PartEvents, ReconstructParts } from './parts';
+import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from './presets';
+import type { ParamValues, PointQuantity, WorkerEvent } from './protocol';
+import { ReconstructResults } from './results';
+import type { CloudViewOptions } from './scene';
+import { ReconstructSettings } from './settings';
+
+/**
+ * Number of voxels along the longest side of the volume in which the implicit function f is saved, or passed on to the
+ * Extract lab.
+ */
+const VOLUME_SIZE = 96;
+
+/** The Reconstruct lab: an implicit surface is fitted to points. Opening, settings and results are in files of their own. */
+export class ReconstructLab extends RunLab<CloudExample> {
+  protected readonly id = 'reconstruct';
+  protected readonly client = new ReconstructClient((event) => this.#onEvent(event));
+  protected readonly ui: ReconstructParts;
+  protected readonly states: LabStates;
+  protected readonly opening: ReconstructOpening;
+  readonly #results: ReconstructResults;
+  readonly #settings: ReconstructSettings;
+  readonly #history = new History();
+  #quantity: PointQuantity | undefined;
+
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
+    super(root, help, passOn);
+    const { client } = this;
+    const { signal } = this.closing;
+    const history = this.#history;
+    const ui = new ReconstructParts(root, history, client, signal, this.#events());
+    const states = new LabStates(ui.banner, ui.status, signal);
+    this.ui = ui;
+    this.states = states;
+    this.#results = new ReconstructResults(client, ui, states, history);
+    this.#settings = new ReconstructSettings(client, ui, states, this.#results, (params) => this.#showParams(params));
+    this.opening = new ReconstructOpening(client, ui, states, this.#settings, (opened, origin) =>
+      this.#adopt(opened, origin),
+    );
+    this.beginRuns();
+  }
+
+  protected override closed(): void {
+    this.#results.close();
+  }
+
+  /** Returns the handlers of the user's actions, which call the parts of the lab. */
+  #events(): PartEvents {
+    return {
+      ...this.runEvents(),
+      onVariant: (preset, variant) => this.#openVariant(preset, variant),
+      onChoice: (choice, what) => void this.#settings.change({ choice }, text('labs.changeOf', { name: what })),
+      onParam: (name, value) => void this.#settings.setParam(name, value),
+      onPick: (hit) => void this.#settings.pick(hit),
+      onTakeBack: () => void this.#settings.takeBackEdits(),
+      onOptions: (options) => this.#setOptions(options),
+      onPhotograph: () => this.updateAddress(),
+      onSaveVolume: () => this.#saveVolume(),
+      onPassOn: () => this.#toExtract(),
+      onSculpt: () => this.toSculpt(this.ui.surfaceFile({ format: 'ply' })),
+    };
+  }
+
+  /** Displays newly opened points, with the settings of their example or link, and runs the model. */
+  async #adopt(opened: OpenedCloud, { name, example, linked, session }: CloudOrigin): Promise<void> {
+    const { cloud, params, photographs, setup } = opened;
+    const pictured = photographs.some(({ picture }) => picture);
+    this.states.ready = true;
+    this.#results.clear();
+    this.ui.adopt(cloud, photographs, example, name);
+    this.#settings.adopt(cloud, setup);
+    const color = (linked?.color ??
+      example?.color ??
+      (pictured || cloud.colors ? 'own' : 'plain')) as CloudViewOptions['color'];
+    this.ui.options.set({ color, points: true, constraints: false, ...(isCloudPreset(example) && example.view) });
+    this.ui.photos.choose(photoFor(example, linked?.photo));
+    this.#settings.showParams(params);
+    if (session) return this.#resume(completed(contentOf(session, 'reconstruct')));
+    await this.client.request('play', undefined);
+  }
+
+  /** Continues a session, whose model has been restored: shows its state and view, and does not run it. */
+  async #resume({ undo, redo, reports, view }: ContentOf<'reconstruct'>): Promise<void> {
+    this.#settings.entries = { undo, redo };
+    const [list = []] = reports;
+    this.#history.rewind({ reports: list, iteration: Number.POSITIVE_INFINITY });
+    if (view) {
+      this.ui.options.set(view.options);
+      this.ui.view.pose = view.camera;
+    }
+    // Sends the surface, its measures and the state.
+    await this.client.request('step', { count: 0 });
+    const state = list.at(-1)?.done ? 'done' : 'paused';
+    this.states.idle(this.#results.describe(state), state);
+    this.#results.showState(state);
+  }
+
+  protected override async sessionContent(): Promise<Record<string, unknown>> {
+    const { state, ...model } = await this.paused(() => this.client.request('save', undefined));
+    const view = { camera: this.ui.view.pose, options: this.ui.options.value };
+    return { state, model, ...this.#settings.entries, reports: [this.#history.reports], view };
+  }
+
+  #openVariant(preset: CloudPreset, { name, params, maxPoints }: CloudVariant): void {
+    const choice = { ...this.#settings.choice, maxPoints: maxPoints ?? preset.maxPoints };
+    const changed = { choice, params: { ...this.opening.defaults, ...preset.params, ...params } };
+    void this.#settings.change(changed, text('labs.figureChange', { name }));
+  }
+
+  #showParams(params: ParamValues): void {
+    const { source, defaults } = this.opening;
+    const example = source?.example;
+    const preset = isCloudPreset(example) ? example : undefined;
+    const variant = preset && variantInForce(preset, params, this.#settings.choice.maxPoints, defaults);
+    this.ui.showParams(params, preset, variant);
+    this.updateAddress();
+  }
+
+  #setOptions({ color }: CloudViewOptions): void {
+    const quantity = color === 'mean curvature' || color === 'distance' ? color : undefined;
+    if (quantity !== this.#quantity) this.ask(this.client.request('quantity', quantity));
+    this.#quantity = quantity;
+    this.updateAddress();
+  }
+
+  protected address({ example, name: file }: CloudOrigin): string {
+    const { choice, params, edits } = this.#settings;
+    const { defaults } = this.opening;
+    const { color } = this.ui.options.value;
+    const photo = this.ui.photos.chosen;
+    const { size } = this.ui.view;
+    return toHash(linkOf({ example, file, choice, params, defaults, edits, size, color, photo }));
+  }
+
+  protected override linkLacks(): (string | false)[] {
+    return [!fits(this.#settings.edits) && text('reconstruct.linkLacksEdits')];
+  }
+
+  #saveVolume(): void {
+    const volume = this.client.request('volume', { size: VOLUME_SIZE });
+    const saved = volume.then(({ extension, bytes }) => {
+      this.ui.saving.bytes(extension, bytes, 'application/octet-stream');
+      if (extension === 'nrrd') this.ui.status.say(text('reconstruct.savedAsNrrd', { stem: this.ui.saving.stem }));
+    });
+    this.ask(saved, text('reconstruct.volumeFailed'));
+  }
+
+  /**
+   * Opens the implicit function f in the Extract lab as a volume, with the value of f at the surface as iso value;
+   * inside the surface, f is above it.
+   */
+  #toExtract(): void {
+    this.ui.status.say(text('reconstruct.samplingVolume'));
+    const name = text('reconstruct.volumeName', { name: this.ui.saving.name });
+    const { surfaceWarnings: warnings } = this.ui;
+    const volume = this.client.request('volume', { size: VOLUME_SIZE });
+    const passed = volume.then(({ bytes, level }) =>
+      this.passOn({ lab: 'extract', name, bytes, params: { iso: level, isoForce: -1 }, warnings }),
+    );
+    this.ask(passed, text('reconstruct.volumeFailed'));
+  }
+
+  /** Rebuilds the model with the same settings and clears the surface; only the points stay. */
+  protected startOver(): Promise<void> {
+    return this.building(async () => {
+      await this.#settings.rebuild();
+      this.#results.clear();
+    });
+  }
+
+  protected travel(way: 'undo' | 'redo'): Promise<void> {
+    return this.#settings.travel(way);
+  }
+
+  #onEvent(event: WorkerEvent): void {
+    if (!this.takes(event)) this.#results.take(event);
+  }
+
+  protected settled(state: LabState): void {
+    this.#results.showState(state);
+  }
+
+  protected showControls(state: LabState): void {
+    const { modelState, ready } = this.states;
+    this.ui.showState(state, modelState, ready, state !== 'loading' && this.#results.complete);
+  }
+
+  protected describe(): string {
+    return this.#results.describe(this.states.value);
+  }
+
+  /** Dismisses the error message, else deselects the edit tool, else leaves the camera of a photograph. */
+  protected override escape(): void {
+    const { banner, tools, photos } = this.ui;
+    if (banner.shown) this.dismiss();
+    else if (tools.tool !== 'none') tools.deselect();
+    else photos.choose(undefined);
+  }
+
+  protected override get escapeText(): string {
+    return text('reconstruct.dismissKey');
+  }
+}

@@ -1,0 +1,285 @@
+import { prefersReducedMotion } from '../../kit/dom';
+import { History } from '../../kit/history';
+import type { LabState } from '../../kit/state';
+import type { OpenInLab } from '../../lab/lab';
+import { LinkError, readLink } from '../../lab/link-query';
+import { contentOf } from '../../lab/session/content';
+import type { ContentOf } from '../../lab/session/schema';
+import { RunLab } from '../../lab/shell';
+import { LabStates } from '../../lab/states';
+import { text } from '../../texts';
+import { SculptClient } from './client';
+import type { SculptExample } from './examples';
+import { lastFrame } from './film';
+import { Filming } from './filming';
+import { filmOf, fits, fromHash, linkOf, toHash } from './link';
+import { type OpenedPose, SculptOpening, type SculptSource } from './opening';
+import { type PartEvents, SculptParts } from './parts';
+import { Posing } from './posing';
+import { isSculptPreset, poseOf, type SculptPreset, type SculptVariant, variantInForce } from './presets';
+import type { FrameContents, FrameEvent, ParamValues, SculptQuantity, Support, WorkerEvent } from './protocol';
+import { SculptResults } from './results';
+import type { SculptViewOptions } from './scene';
+import { type SculptMoments, SculptSettings } from './settings';
+
+/** The colourings of the surface for which the worker has to compute values at the vertices. */
+const QUANTITIES: readonly string[] = [
+  'area distortion',
+  'angle distortion',
+  'mean curvature',
+] satisfies SculptQuantity[];
+
+/**
+ * The Sculpt lab: a detailed surface is deformed by ellipsoids. Opening, settings, posing, filming and results are in
+ * files of their own.
+ */
+export class SculptLab extends RunLab<SculptExample> {
+  protected readonly id = 'sculpt';
+  protected readonly client = new SculptClient((event) => this.#onEvent(event));
+  protected readonly ui: SculptParts;
+  protected readonly states: LabStates;
+  protected readonly opening: SculptOpening;
+  readonly #results: SculptResults;
+  readonly #settings: SculptSettings;
+  readonly #posing: Posing;
+  readonly #filming: Filming;
+  /**
+   * Parameters that the scene opened with, including the model's own choices, but without changes by a link, which
+   * contains only parameters that differ from these.
+   */
+  #usual: ParamValues = {};
+  #shown: FrameContents = { layout: 'result', quantity: undefined, textured: false };
+
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
+    super(root, help, passOn);
+    const { client } = this;
+    const { signal } = this.closing;
+    const history = new History();
+    const ui = new SculptParts(root, history, client, signal, this.#events());
+    const states = new LabStates(ui.banner, ui.status, signal);
+    this.ui = ui;
+    this.states = states;
+    this.#results = new SculptResults(client, ui, states, history, (frame) => this.#follow(frame));
+    this.#settings = new SculptSettings(client, ui, states, history, () => this.#showSettings());
+    this.#posing = new Posing(ui, this.#settings, () => this.work.did('shaped'));
+    this.#filming = new Filming(client, ui, states, this.#settings);
+    this.opening = new SculptOpening(client, ui, states, (opened, source) => this.#adopt(opened, source));
+    const addKey = () => this.#filming.addKey();
+    this.beginRuns([{ key: 'k', shown: 'k', text: text('sculpt.addKeyframeKey'), act: addKey }]);
+  }
+
+  protected override closed(): void {
+    this.#posing.close();
+  }
+
+  /** Returns the handlers of the user's actions, which call the parts of the lab. */
+  #events(): PartEvents {
+    return {
+      ...this.runEvents(),
+      onVariant: (preset, variant) => this.#openVariant(preset, variant),
+      onChoose: (index) => this.#settings.choose(index),
+      onMode: (mode) => {
+        this.#posing.mode = mode;
+      },
+      onChange: (ellipsoid, what) => this.#posing.change(ellipsoid, what),
+      onAdd: () => this.#posing.add(),
+      onRemove: () => this.#posing.remove(),
+      onAddKey: () => this.#filming.addKey(),
+      onRemoveKey: (index) => this.#filming.removeKey(index),
+      onBetween: (frames) => this.#filming.setBetween(frames),
+      onLoop: (loop) => this.#filming.setLoop(loop),
+      onSeek: (frame) => this.#filming.seek(frame),
+      onRecord: () => void this.#filming.record(),
+      onCancelRecord: () => void this.client.request('cancelRecord', undefined),
+      onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.ui.labelOf(name)),
+      onSupport: (support) => void this.#setSupport(support),
+      onOptions: (options) => this.#setOptions(options),
+    };
+  }
+
+  /**
+   * Displays a newly opened scene, with the settings of its example or link. Plays its film; without a film, with a
+   * pose from a link, or if the film loops and the user prefers reduced motion, the surface only settles in the pose.
+   */
+  async #adopt(opened: OpenedPose, { name, example, session, ...source }: SculptSource): Promise<void> {
+    const settings = session ? readLink(() => fromHash(session.hash)) : source.linked;
+    const linked = settings instanceof LinkError ? undefined : settings;
+    this.states.ready = true;
+    this.#usual = { ...opened.params };
+    for (const [name, value] of Object.entries(linked?.params ?? {}))
+      if (example?.params[name] === undefined) delete this.#usual[name];
+      else if (Object.is(opened.params[name], value)) this.#usual[name] = example.params[name];
+    this.#results.clear();
+    this.ui.adopt(opened, example, name, source.warnings);
+    const film = filmOf(linked ?? { params: {} }, example?.film);
+    const { support, start, pose, params } = opened;
+    this.#settings.adopt({
+      support,
+      start,
+      pose,
+      names: example?.names ?? [],
+      posed: linked?.pose !== undefined,
+      opensPosed: poseOf(example) !== undefined,
+      film,
+      params,
+    });
+    const color = (linked?.color ?? example?.color ?? 'plain') as SculptViewOptions['color'];
+    const layout = (linked?.layout ?? example?.layout ?? 'result') as SculptViewOptions['layout'];
+    const preset = isSculptPreset(example) ? example : undefined;
+    this.ui.options.staged = preset?.stages !== undefined;
+    this.ui.options.set({
+      color,
+      layout: layout === 'stages' && !preset?.stages ? 'result' : layout,
+      edges: false,
+      ellipsoids: true,
+      ...preset?.view,
+    });
+    if (preset?.stages) this.#results.showStages(preset.stages);
+    if (opened.moments) return this.#resume(opened.moments, session && contentOf(session, 'sculpt').view);
+    await this.#settings.setFilm(film, 0);
+    await this.client.request('show', this.#shown);
+    const endless = film?.loop === true && prefersReducedMotion();
+    await this.client.request(film && !linked?.pose && !endless ? 'play' : 'settle', undefined);
+  }
+
+  /** Continues a session: shows its state and view, and does not run it. */
+  async #resume(moments: SculptMoments, view: ContentOf<'sculpt'>['view']): Promise<void> {
+    if (view) this.ui.options.set(view.options);
+    await this.client.request('show', this.#shown);
+    await this.#settings.resume(moments);
+    this.states.idle(this.#results.describe('paused'));
+    if (view) this.ui.view.pose = view.camera;
+  }
+
+  protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {
+    const [moments, log] = await this.paused(async () => [
+      await this.#settings.moments(),
+      await this.client.request('log', undefined),
+    ]);
+    if (!moments) return undefined;
+    const view = { camera: this.ui.view.pose, options: this.ui.options.value };
+    return {
+      ...(await import('../../lab/session/moments')).packMoments(moments),
+      params: this.#settings.params,
+      log,
+      view,
+    };
+  }
+
+  protected override linkLacks(): (string | false)[] {
+    return [!fits(this.#settings.pose) && text('sculpt.linkLacksPose')];
+  }
+
+  #openVariant(preset: SculptPreset, { name, params, pose }: SculptVariant): void {
+    const values = { ...this.#usual, ...params };
+    const differs = Object.entries(values).some(([key, value]) => !Object.is(this.#settings.params[key], value));
+    if (differs) void this.#settings.setParams(values, text('labs.figureChange', { name }));
+    this.#settings.checkpoint(text('labs.figureChange', { name }));
+    this.#settings.send(pose ?? preset.start ?? this.#settings.pose, false);
+  }
+
+  #follow(frame: FrameEvent): void {
+    this.#settings.follow(frame, this.states.modelState === 'running');
+  }
+
+  #showSettings(): void {
+    const { params, pose, support } = this.#settings;
+    this.ui.showSupport(support);
+    this.#results.support = support;
+    const example = this.opening.source?.example;
+    const preset = isSculptPreset(example) ? example : undefined;
+    this.ui.showParams(params, preset, preset && variantInForce(preset, pose, params, this.#usual));
+    this.showControls(this.states.value);
+    this.updateAddress();
+  }
+
+  get #hasFilm(): boolean {
+    const { film } = this.#settings;
+    return film !== undefined && lastFrame(film) > 0;
+  }
+
+  #setOptions({ layout, color }: SculptViewOptions): void {
+    const quantity = QUANTITIES.includes(color) ? (color as SculptQuantity) : undefined;
+    const textured = color === 'texture';
+    const before = this.#shown;
+    const changed = layout !== before.layout || quantity !== before.quantity || textured !== before.textured;
+    this.#shown = { layout, quantity, textured };
+    if (!this.states.ready) return;
+    if (changed) this.ask(this.client.request('show', this.#shown));
+    this.#results.showOriginals();
+    this.updateAddress();
+  }
+
+  protected override get canPlay(): boolean {
+    return this.states.canChange && (this.#hasFilm || this.states.modelState === 'paused');
+  }
+
+  protected override get canStep(): boolean {
+    return this.states.canChange;
+  }
+
+  protected override beforeRun(change: string): void {
+    this.#settings.checkpoint(change);
+  }
+
+  /** Builds another model of the same surface, with another support. */
+  async #setSupport(support: Support): Promise<void> {
+    if (this.states.canChange) await this.#build(support);
+    this.ui.showSupport(this.#settings.support);
+  }
+
+  /** Rebuilds the model, with the ellipsoids in the scene's start pose and the history of steps cleared. */
+  protected startOver(): Promise<void> {
+    return this.#build(this.#settings.support);
+  }
+
+  #build(support: Support): Promise<void> {
+    return this.building(async () => {
+      await this.#settings.rebuild(support);
+      this.#results.startOver();
+      await this.client.request('show', this.#shown);
+    });
+  }
+
+  protected travel(way: 'undo' | 'redo'): Promise<void> {
+    return this.#settings.travel(way);
+  }
+
+  protected address({ example, name: file }: SculptSource): string {
+    const { params, support, start, pose: present, posed, film } = this.#settings;
+    const { color, layout } = this.ui.options.value;
+    const pose = posed ? present : undefined;
+    return toHash(linkOf({ example, file, params, usual: this.#usual, support, start, pose, film, color, layout }));
+  }
+
+  #onEvent(event: WorkerEvent): void {
+    if (this.takes(event)) return;
+    if (event.event === 'recorded') this.ui.film.showRecording(event.progress);
+    else if (event.event === 'frame') this.#results.take(event);
+    else if (event.event === 'measured') this.#results.measured(event);
+    else this.#settings.reject(event.pose, event.failure.message);
+  }
+
+  protected settled(state: LabState): void {
+    this.#results.showState(state);
+  }
+
+  protected showControls(state: LabState): void {
+    const { modelState, ready } = this.states;
+    this.ui.showState(state, modelState, ready, this.#hasFilm);
+  }
+
+  protected describe(): string {
+    return this.#results.describe(this.states.value);
+  }
+
+  /** Dismisses the error message, else deselects the ellipsoid. */
+  protected override escape(): void {
+    if (this.ui.banner.shown) this.dismiss();
+    else this.#settings.choose(undefined);
+  }
+
+  protected override get escapeText(): string {
+    return text('sculpt.dismissKey');
+  }
+}

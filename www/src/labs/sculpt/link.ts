@@ -1,0 +1,161 @@
+/** Converts the Sculpt lab's settings to the hash of an address, `#sculpt?…`, and back. */
+import type { ParamValues } from '../../engine/protocol';
+import { allIn, differing, paramsIn, queryOf, textsIn } from '../../lab/link-query';
+import { fromNumbers, lengthsOf, toNumbers } from './ellipsoids';
+import { SCENES, type SculptExample } from './examples';
+import type { Film } from './film';
+import type { Pose, Support } from './protocol';
+
+const ADDRESS = '#sculpt';
+/** Most keyframes that a link includes: some programs truncate long addresses. */
+export const MOST_KEYS = 12;
+/** Most ellipsoids of a pose that a link includes. */
+const MOST_ELLIPSOIDS = 60;
+
+/** Tests whether a pose has few enough ellipsoids for a link. */
+export const fits = (pose: Pose | undefined): boolean => (pose?.length ?? 0) <= MOST_ELLIPSOIDS;
+
+/**
+ * Settings of the Sculpt lab that are contained in a link; missing ones are as in the example, or else the method's
+ * defaults.
+ */
+export interface LinkedScene {
+  example?: string;
+  /** Name of the user's file, if one is open; the link does not contain the file itself. */
+  file?: string;
+  params: ParamValues;
+  /**
+   * Support of the surface of a file; links of versions that knew only the membrane do not say so. Undefined for
+   * examples.
+   */
+  support?: Support;
+  /** The ellipsoids that leave a surface that holds itself as it is, if they have moved. */
+  rest?: Pose;
+  /** Target pose of the ellipsoids, if it was set by hand. */
+  pose?: Pose;
+  names?: string[];
+  /** Keyframes of the user's own film; without them, `loop` applies to the example's film. */
+  keys?: Pose[];
+  between?: number;
+  loop?: boolean;
+  color?: string;
+  layout?: string;
+}
+
+/** Present settings of the Sculpt lab, from which a link is made. */
+export interface SceneSettings {
+  example: SculptExample | undefined;
+  file: string;
+  params: ParamValues;
+  /** Parameters that the scene opened with, without changes by a link. */
+  usual: ParamValues;
+  support: Support;
+  /** The ellipsoids with which the model was built. */
+  start: Pose;
+  pose: Pose | undefined;
+  film: Film | undefined;
+  color: string;
+  layout: string;
+}
+
+/**
+ * Returns what a link to the lab's present state contains: the settings that differ from those of the example, and the
+ * parameters that differ from `usual`; keyframes only if there are at most {@link MOST_KEYS}.
+ */
+export function linkOf(settings: SceneSettings): LinkedScene {
+  const { example, file, params, usual, support, start, pose, film, color, layout } = settings;
+  const own =
+    film !== example?.film && film && 'keys' in film && film.keys.length <= MOST_KEYS && film.keys.every(fits);
+  const looped = film?.loop !== undefined && film.loop !== (example?.film?.loop ?? false);
+  return {
+    ...(!example && { file, support }),
+    ...(example && example !== SCENES[0] && { example: example.id }),
+    params: withBothEdges(differing(params, usual), params),
+    ...(support === 'surface' && (own || pose) && fits(start) && { rest: start }),
+    ...(pose && fits(pose) && { pose }),
+    ...(own && { keys: film.keys, between: film.between }),
+    ...(looped && { loop: film.loop }),
+    ...(color !== (example?.color ?? 'plain') && { color }),
+    ...(layout !== (example?.layout ?? 'result') && { layout }),
+  };
+}
+
+/** Adds the other edge length to one that is in a link: without it, the model would choose it to suit. */
+function withBothEdges(linked: ParamValues, params: ParamValues): ParamValues {
+  const edges = ['edgeMin', 'edgeMax'];
+  if (!edges.some((name) => name in linked)) return linked;
+  return Object.fromEntries(Object.entries(params).filter(([name]) => name in linked || edges.includes(name)));
+}
+
+/**
+ * Returns the film for the settings in a link: of the link's keyframes or, if it has none, `usual`, the example's film;
+ * the link may also set whether the film loops.
+ */
+export function filmOf({ keys, between, loop }: LinkedScene, usual: Film | undefined): Film | undefined {
+  const film = keys && keys.length > 0 ? { keys, between: between ?? 24, loop: false } : usual;
+  return film && loop !== undefined ? { ...film, loop } : film;
+}
+
+/**
+ * Converts a pose of the ellipsoids to text for a link. The numbers of an ellipsoid are rounded to multiples of a power
+ * of ten that is at most 10⁻⁴ of its longest semi-axis, which is finer than any drag.
+ */
+function asText(pose: Pose): string {
+  return pose
+    .map((one) =>
+      toNumbers(one)
+        .map(rounding(1e-4 * Math.max(...lengthsOf(one))))
+        .join(','),
+    )
+    .join(';');
+}
+
+function rounding(step: number): (value: number) => number {
+  const power = 10 ** Math.floor(Math.log10(step));
+  return (value) => Number((Math.round(value / power) * power).toPrecision(15));
+}
+
+function asPose(text: string): Pose | undefined {
+  const pose = text.split(';', MOST_ELLIPSOIDS).map((one) => fromNumbers(one.split(',').map(Number)));
+  return pose.every((one) => one !== undefined) ? pose : undefined;
+}
+
+/** Converts the settings in a link to the hash of an address. */
+export function toHash(linked: LinkedScene): string {
+  const query = new URLSearchParams();
+  for (const name of ['example', 'file', 'support', 'color', 'layout', 'between', 'loop'] as const) {
+    const value = linked[name];
+    if (value !== undefined) query.set(name, String(value));
+  }
+  for (const [name, value] of Object.entries(linked.params)) query.set(`p.${name}`, String(value));
+  if (linked.rest) query.set('rest', asText(linked.rest));
+  if (linked.pose) query.set('pose', asText(linked.pose));
+  for (const key of linked.keys ?? []) query.append('key', asText(key));
+  const text = query.toString().replaceAll('%2C', ',').replaceAll('%3B', ';');
+  return text ? `${ADDRESS}?${text}` : ADDRESS;
+}
+
+/**
+ * Parses the hash of an address; undefined if it is for another lab or contains no settings. Settings that cannot be
+ * parsed are ignored; whether names and values are valid is not checked here.
+ */
+export function fromHash(hash: string): LinkedScene | undefined {
+  const query = queryOf(hash, ADDRESS);
+  if (!query) return undefined;
+  const linked: LinkedScene = {
+    ...textsIn(query, ['example', 'file', 'color', 'layout']),
+    params: paramsIn(query),
+  };
+  const between = Number(query.get('between') ?? Number.NaN);
+  if (Number.isInteger(between) && between > 0) linked.between = between;
+  if (query.has('loop')) linked.loop = query.get('loop') === 'true';
+  const support = query.get('support');
+  if (support === 'surface' || support === 'membrane') linked.support = support;
+  for (const name of ['rest', 'pose'] as const) {
+    const pose = asPose(query.get(name) ?? '');
+    if (pose) linked[name] = pose;
+  }
+  const keys = allIn(query, 'key', MOST_KEYS).flatMap((key) => [asPose(key) ?? []].filter(({ length }) => length > 0));
+  if (keys.length > 0) linked.keys = keys;
+  return linked;
+}

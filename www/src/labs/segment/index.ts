@@ -1,0 +1,439 @@
+import { RequestError, toFailure } from '../../engine/channel';
+import { rgbOf } from '../../engine/labels';
+import { release } from '../../engine/release';
+import { nameOf, readFiles } from '../../importers/files';
+
+import type { Shortcut } from '../../kit/shortcuts';
+import type { LabState } from '../../kit/state';
+import type { OpenInLab } from '../../lab/lab';
+import { contentOf } from '../../lab/session/content';
+import type { ContentOf } from '../../lab/session/schema';
+import { LabShell } from '../../lab/shell';
+import { LabStates } from '../../lab/states';
+import { spaceOf, unitOf } from '../../lab/surface-space';
+import { plural, text } from '../../texts';
+import { SegmentClient } from './client';
+import { SegmentEditing } from './editing';
+import type { SegmentExample } from './examples';
+import type { Overlays } from './label-overlay';
+import { INITIAL_VIEW, linkOf, toHash } from './link';
+import { SegmentOpening, type SegmentSource } from './opening';
+import { factsOf, MAP_FACT } from './page';
+import type { LabelMeasures } from './panels/label-measures';
+import { type Tool, type ToolSettings, usesRange } from './panels/tools';
+import { type PartEvents, SegmentParts, type SurfaceFormat } from './parts';
+import type { OpenedImage, OpenedLabels, ParamValues, SurfaceUpdate, VolumeView, WorkerEvent } from './protocol';
+import { saveMap, saveSurfaces } from './saving';
+
+/** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
+const MASK_DELAY = 120;
+
+/** Overlays before there are labels. */
+const NO_OVERLAYS: Pick<Overlays, 'colors' | 'names' | 'paint' | 'mask'> = {
+  colors: new Map(),
+  names: new Map(),
+  paint: [255, 255, 255],
+  mask: undefined,
+};
+
+/**
+ * The Segment lab: labels are painted on slices, and their surfaces follow. Opening, editing and saving are in files of
+ * their own.
+ */
+export class SegmentLab extends LabShell<SegmentExample> {
+  protected readonly id = 'segment';
+  protected readonly client = new SegmentClient((event) => this.#onEvent(event));
+  protected readonly ui: SegmentParts;
+  protected readonly states: LabStates;
+  protected readonly opening: SegmentOpening;
+  readonly #editing: SegmentEditing;
+  readonly #measures = new Map<number, LabelMeasures>();
+  #volume: VolumeView | undefined;
+  /** Parameters of the surfaces in force. */
+  #params: ParamValues = {};
+  /** Range of intensities of the mask that the editing has, as text; undefined if it has none. */
+  #maskRange: string | undefined;
+  #maskTimer = 0;
+  /** Time in milliseconds at which the last stroke ended; undefined once its surfaces are drawn. */
+  #released: number | undefined;
+  /** Whether the last fill has reached no voxel. */
+  #isUnfilled = false;
+  /** Milliseconds from the end of the last stroke until surfaces with it were drawn, and smooth ones. */
+  #latency: { first?: number; smooth?: number } = {};
+  /** Number of times that surfaces were shown. */
+  #updates = 0;
+
+  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
+    super(root, help, passOn);
+    const { signal } = this.closing;
+    const ui = new SegmentParts(root, signal, this.#events());
+    const states = new LabStates(ui.banner, ui.status, signal);
+    this.ui = ui;
+    this.states = states;
+    this.#editing = new SegmentEditing(this.client, {
+      onLabels: () => this.#showLabels(),
+      onVoxels: () => ui.view.showLabels(),
+      onUpdate: (update, smooth) => {
+        ui.warnings.showReport(update);
+        this.#take(update, smooth);
+      },
+      onBusy: () => states.setModelState('running'),
+      onNothing: (reason) => {
+        this.#isUnfilled = true;
+        this.#released = undefined;
+        ui.status.say(reason);
+      },
+      onUndo: (undoable, redoable) => {
+        if (undoable) this.work.did('painted');
+        else this.work.settled('painted');
+        ui.tools.showUndo(undoable, redoable);
+      },
+      onError: (title, error) => states.fail(title, error),
+    });
+    this.opening = new SegmentOpening(this.client, ui, states, {
+      adopt: (opened, source, reopening) => this.#adopt(opened, source, reopening),
+      labels: () => this.#editing.voxels?.slice(),
+    });
+    this.#applyTool(ui.tools.value);
+    this.begin(this.#shortcuts());
+  }
+
+  protected override closed(): void {
+    clearTimeout(this.#maskTimer);
+    delete this.root.dataset.tool;
+  }
+
+  /** Returns the handlers of the user's actions, which call the parts of the lab. */
+  #events(): PartEvents {
+    return {
+      ...this.labEvents(),
+      onMapFiles: (files) => void this.#openLabels(files),
+      onParam: (name, value) => void this.#setParam(name, value),
+      onOptions: () => this.#optionsChanged(),
+      onSaveMap: (format) => this.ask(this.#saveMap(format), text('segment.saveFailed')),
+      onSaveSurfaces: (format) => this.#saveSurfaces(format),
+      onReset: () => void this.#reset(),
+      onActive: (value) => this.#editing.setActive(value),
+      onRename: (value, name) => this.#editing.rename(value, name),
+      onColor: (value, color) => this.#editing.recolor(value, color),
+      onVisible: (value, visible) => this.#editing.setVisible(value, visible),
+      onAdd: () => this.#addLabel(),
+      onRemove: (value) => this.#editing.remove(value),
+      onSettings: (settings) => this.#applyTool(settings),
+      onApply: () => this.#apply(),
+      onUndo: () => this.#travel('undo'),
+      onRedo: () => this.#travel('redo'),
+      press: (at, axis) => this.#press(at, axis),
+      onPick: (label) => this.#editing.setActive(label),
+    };
+  }
+
+  #shortcuts(): Shortcut[] {
+    const tool = (key: string, one: Tool, what: string): Shortcut => ({
+      key,
+      shown: key,
+      text: what,
+      act: () => this.ui.tools.set({ tool: one }),
+    });
+    const travel = (direction: 'undo' | 'redo') => () => this.#travel(direction);
+    return [
+      tool('b', 'brush', text('segment.brush')),
+      tool('t', 'threshold', text('segment.threshold')),
+      tool('e', 'eraser', text('segment.eraser')),
+      tool('f', 'fill', text('segment.fill')),
+      tool('v', 'navigate', text('segment.navigate')),
+      { key: '[', shown: '[', text: text('segment.smallerKey'), act: () => this.ui.tools.changeRadius(-1) },
+      { key: ']', shown: ']', text: text('segment.largerKey'), act: () => this.ui.tools.changeRadius(1) },
+      { key: ',', shown: ',', text: text('segment.previousSliceKey'), act: () => this.ui.view.goAlong(-1) },
+      { key: '.', shown: '.', text: text('segment.nextSliceKey'), act: () => this.ui.view.goAlong(1) },
+      { key: 'p', shown: 'p', text: text('segment.applyKey'), act: () => this.#apply() },
+      { key: 'n', shown: 'n', text: text('segment.addKey'), act: () => this.#addLabel() },
+      { key: 'u', shown: 'u', text: text('labs.undo'), act: travel('undo') },
+      { key: 'z', ctrl: true, shown: text('labs.keyUndo'), text: text('labs.undo'), act: travel('undo') },
+      { key: 'shift+z', ctrl: true, shown: text('labs.keyRedo'), text: text('labs.redo'), act: travel('redo') },
+      { key: 'y', ctrl: true, shown: text('labs.keyRedoToo'), text: text('labs.redo'), act: travel('redo') },
+    ];
+  }
+
+  /** Displays a newly opened volume and its labels; after a failure of the engine, with the list of labels as before. */
+  #adopt(opened: OpenedImage, { name, example, linked, session }: SegmentSource, reopening: boolean): void {
+    const { volume, voxels, params } = opened;
+    const before = [this.#volume?.voxels, this.#editing.voxels];
+    this.states.ready = true;
+    this.#volume = volume;
+    this.ui.saving.name = example?.id ?? name;
+    this.#params = params;
+    this.ui.data.show(factsOf(opened, example), example);
+    this.ui.unit = example?.unit ?? unitOf(volume);
+    this.ui.showParams(params);
+    this.#forgetMask();
+    this.ui.view.setVolume(volume, { dims: volume.dims, voxels, ...NO_OVERLAYS });
+    if (reopening) this.#editing.readopt(volume, opened);
+    else if (session) this.#resume(opened, contentOf(session, 'segment'));
+    else {
+      this.#editing.adopt(volume, opened, example?.labels ?? []);
+      this.ui.tools.set({ range: example?.range ?? [...volume.window] });
+      this.ui.options.set({ ...INITIAL_VIEW, ...linked?.view });
+    }
+    before.forEach(release);
+    this.#applyTool(this.ui.tools.value);
+    this.#showAll(opened);
+  }
+
+  /** Continues a session: its list of labels, tools and view. */
+  #resume(opened: OpenedImage, { tools, view, ...list }: ContentOf<'segment'>): void {
+    this.#editing.resume(opened.volume, opened, list);
+    if (tools) this.ui.tools.set(tools);
+    this.ui.data.setFact(MAP_FACT, text('segment.sessionMap'));
+    if (!view) return;
+    this.ui.options.set(view.options);
+    this.ui.view.pose = view;
+  }
+
+  protected override async sessionContent(): Promise<Record<string, unknown>> {
+    while (this.#editing.isBusy) await this.#editing.followed;
+    const { labels, active, hidden, voxels } = this.#editing;
+    const copy = voxels?.slice();
+    const state = await this.client.request('save', undefined);
+    const view = { ...this.ui.view.pose, options: this.ui.options.value };
+    const list = { labels, active, hidden: [...hidden] };
+    return { voxels: copy, state, ...list, params: this.#params, tools: this.ui.tools.value, view };
+  }
+
+  /** Opens a label map of the open volume in place of the present one. */
+  async #openLabels(files: File[]): Promise<void> {
+    const volume = this.#volume;
+    if (!volume || !this.states.canChange || !(await this.mayReplace())) return;
+    const name = nameOf(files);
+    this.states.load(text('labs.opening', { name }));
+    try {
+      const opened = await this.client.request('openLabels', { files: await readFiles(files) });
+      const before = this.#editing.voxels;
+      this.ui.view.setVolume(volume, { dims: volume.dims, voxels: opened.voxels, ...NO_OVERLAYS });
+      this.#forgetMask();
+      this.#editing.adopt(volume, opened, []);
+      release(before);
+      this.#applyTool(this.ui.tools.value);
+      this.ui.data.setFact(MAP_FACT, opened.labelFile ?? name);
+      this.#showAll(opened);
+    } catch (error) {
+      this.states.fail(text('labs.openFailed', { name }), error);
+    }
+  }
+
+  #showAll(opened: OpenedLabels): void {
+    this.ui.warnings.showData(opened.warnings);
+    this.#measures.clear();
+    this.#released = undefined;
+    this.#latency = {};
+    this.#show(opened);
+    this.#editing.follow();
+  }
+
+  /** Shows surfaces that have followed a change; when they are smooth, the lab is done. */
+  #take(update: SurfaceUpdate, smooth: boolean): void {
+    this.#show(update);
+    const released = this.#released;
+    if (smooth) this.ui.view.afterDrawing(() => this.#settle());
+    else if (update.surfaces.length > 0 && released !== undefined)
+      this.ui.view.afterDrawing(() => {
+        this.#latency = { first: performance.now() - released };
+      });
+  }
+
+  /** Ends a change, when its smooth surfaces are drawn, unless another one has begun. */
+  #settle(): void {
+    if (this.#editing.isBusy) return;
+    if (this.#released !== undefined) this.#latency = { ...this.#latency, smooth: performance.now() - this.#released };
+    this.#released = undefined;
+    this.#showMeasures();
+    if (this.states.setModelState('done')) this.ui.status.say(this.describe());
+  }
+
+  #show({ surfaces }: SurfaceUpdate): void {
+    if (surfaces.length > 0) this.#updates += 1;
+    this.ui.view.showSurfaces(surfaces);
+    for (const { value, voxels, volume, area, surface } of surfaces) {
+      const { vertices = 0, triangles = 0 } = surface ?? {};
+      const version = (this.#measures.get(value)?.version ?? 0) + 1;
+      this.#measures.set(value, { value, voxels, volume, area, vertices, triangles, version });
+    }
+    this.#showMeasures();
+  }
+
+  #showMeasures(): void {
+    this.ui.measures.show(this.#editing.labels, this.#measures, this.ui.unit, {
+      latency: this.#latency,
+      updates: this.#updates,
+    });
+  }
+
+  /** Shows the list of labels and their colours everywhere. */
+  #showLabels(): void {
+    const { labels, active, hidden } = this.#editing;
+    const visible = labels.filter(({ value }) => !hidden.has(value));
+    this.ui.labels.show(labels, active, hidden);
+    this.ui.view.setAppearance(new Map(labels.map(({ value, color }) => [value, color])), hidden);
+    const painted = labels.find(({ value }) => value === active);
+    this.ui.view.showLabels({
+      colors: new Map(visible.map((label) => [label.value, rgbOf(label)])),
+      names: new Map(labels.map(({ value, name }) => [value, name])),
+      ...(painted && { paint: rgbOf(painted) }),
+    });
+    this.#showMeasures();
+  }
+
+  #press(at: Parameters<PartEvents['press']>[0], axis: Parameters<PartEvents['press']>[1]) {
+    if (!this.states.canChange) return undefined;
+    this.#isUnfilled = false;
+    const grip = this.#editing.press(at, axis, this.ui.tools.value);
+    if (!grip || this.#isUnfilled) return grip;
+    this.#released = undefined;
+    this.#latency = {};
+    const drop = () => {
+      this.#released = performance.now();
+      grip.drop();
+      // The surfaces may have followed before the pointer was released.
+      if (!this.#editing.isBusy) this.ui.view.afterDrawing(() => this.#settle());
+    };
+    return { move: grip.move, drop };
+  }
+
+  /** Applies the tool in use at the crosshair: the alternative to the pointer for the keyboard. */
+  #apply(): void {
+    const { view, tools } = this.ui;
+    if (!this.states.canChange) return;
+    if (tools.value.tool === 'navigate') this.ui.status.say(text('segment.applyNothing'));
+    else {
+      this.#latency = {};
+      this.#released = performance.now();
+      this.#editing.apply(view.crosshair, view.axial, tools.value);
+    }
+  }
+
+  #addLabel(): void {
+    if (this.states.canChange && !this.#editing.add()) this.ui.labels.showError(text('segment.noRoom'));
+  }
+
+  #travel(direction: 'undo' | 'redo'): void {
+    if (!this.states.canChange) return;
+    this.#latency = {};
+    this.#released = performance.now();
+    this.#editing.travel(direction);
+  }
+
+  #applyTool(settings: ToolSettings): void {
+    const { tool, radius, shape } = settings;
+    const voxel = Math.min(...(this.#volume?.spacing ?? [1]));
+    const hasBrush = tool === 'brush' || tool === 'threshold' || tool === 'eraser';
+    // Half a voxel more, as the brush covers.
+    this.ui?.view.setBrush(hasBrush ? { radius: (radius + 0.5) * voxel, disc: shape === 'disc' } : undefined);
+    this.root.dataset.tool = tool;
+    this.#followRange(settings);
+  }
+
+  /** Asks the worker which voxels are in the range of intensities, if the tool in use needs that, and it is another one. */
+  #followRange(settings: ToolSettings): void {
+    if (!this.#editing || !this.states.ready) return;
+    const { range } = settings;
+    const wanted = range.join(' ');
+    const isKnown = wanted === this.#maskRange;
+    const isUsed = usesRange(settings);
+    this.ui.view.showLabels({ mask: isUsed && isKnown ? this.#editing.mask : undefined });
+    if (!isUsed || isKnown) return;
+    this.#forgetMask();
+    this.#maskTimer = window.setTimeout(() => void this.#requestMask(range, wanted), MASK_DELAY);
+  }
+
+  async #requestMask([low, high]: [number, number], wanted: string): Promise<void> {
+    try {
+      const mask = await this.client.request('mask', { low, high });
+      if (mask.length !== this.#editing.voxels?.length) return;
+      this.#maskRange = wanted;
+      this.#editing.mask = mask;
+      this.#followRange(this.ui.tools.value);
+    } catch (error) {
+      this.states.fail(text('labs.requestFailed'), error);
+    }
+  }
+
+  #forgetMask(): void {
+    this.#maskRange = undefined;
+    this.#editing.mask = undefined;
+    clearTimeout(this.#maskTimer);
+  }
+
+  #setParam(name: string, value: unknown): Promise<void> {
+    return this.states.enqueue(async () => {
+      if (!this.states.canChange) return this.ui.showParams(this.#params);
+      try {
+        const params = await this.client.request('setParams', { [name]: value });
+        this.#params = params;
+        this.ui.showParams(params);
+        this.#released = undefined;
+        this.#latency = {};
+        this.#editing.follow();
+      } catch (error) {
+        const { code, message } = toFailure(error);
+        if (code === 'internal') this.states.fail(text('labs.requestFailed'), error);
+        this.ui.showParams(this.#params);
+        this.ui.refuseParam(name, message);
+      }
+    });
+  }
+
+  #optionsChanged(): void {
+    if (this.states?.ready) this.updateAddress();
+  }
+
+  protected describe(): string {
+    const present = [...this.#measures.values()].filter(({ voxels }) => voxels > 0);
+    if (present.length === 0) return text('segment.nothingLabelled');
+    const labels = plural('segment.surfaces', present.length);
+    const { smooth } = this.#latency;
+    if (smooth === undefined) return text('segment.ready', { labels });
+    return text('segment.followed', { labels, milliseconds: Math.round(smooth) });
+  }
+
+  #onEvent({ failure }: WorkerEvent): void {
+    this.states.fail(text('labs.requestFailed'), new RequestError(failure));
+  }
+
+  protected showControls(state: LabState): void {
+    this.ui.showState(state, this.states.ready);
+  }
+
+  protected address({ example, name: file }: SegmentSource): string {
+    const { defaults } = this.opening;
+    return toHash(linkOf({ example, file, params: this.#params, defaults, view: this.ui.options.value }));
+  }
+
+  protected override linkLacks(): string[] {
+    return [text('segment.linkLacksLabels')];
+  }
+
+  async #saveMap(format: Parameters<typeof saveMap>[0]): Promise<void> {
+    await saveMap(format, this.client, this.ui.saving, this.#editing.labels);
+    this.work.settled('painted');
+  }
+
+  #saveSurfaces(format: SurfaceFormat, recentre = false): void {
+    this.ui.offer.hide();
+    const surfaces = this.ui.view.surfaces();
+    const space = this.#volume ? spaceOf(this.#volume, this.ui.unit) : {};
+    const saving = saveSurfaces({ format, recentre, ...space }, this.client, this.ui, this.#editing.labels, surfaces);
+    const offering = saving.catch((error) => {
+      const [first] = surfaces.values();
+      if (toFailure(error).code !== 'precision' || !first) throw error;
+      this.ui.offer.show(format, first.origin, () => this.#saveSurfaces(format, true));
+    });
+    this.ask(offering, text('segment.saveFailed'));
+  }
+
+  /** Opens volume and label map again; after a failure of the engine, with the present labels. */
+  async #reset(): Promise<void> {
+    const { source } = this.opening;
+    if (this.states.engineBroken) await this.opening.reopen();
+    else if (this.states.canChange && source && (await this.mayReplace())) await this.opening.again();
+  }
+}

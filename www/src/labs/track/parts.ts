@@ -1,0 +1,212 @@
+import { concerning, type Warning } from '../../engine/warnings';
+import { fileChooser } from '../../importers/files';
+import { folded, h, section, wideButton } from '../../kit/dom';
+import { FigurePanel } from '../../kit/figure';
+import type { History } from '../../kit/history';
+import { MeasurePanel } from '../../kit/measures';
+import type { LabState } from '../../kit/state';
+import { OptionControls } from '../../kit/view-options';
+import { type RunEvents, RunParts } from '../../lab/parts';
+import { spaceOf, unitOf } from '../../lab/surface-space';
+import { text } from '../../texts';
+import type { VoxelBox } from './box';
+import type { TrackClient } from './client';
+import type { TrackExample } from './examples';
+import { TRACK_ROWS } from './measures';
+import { factsOf, imageData } from './page';
+import { TrackComparePanel } from './panels/compare';
+import { EdgeThreshold } from './panels/edge-threshold';
+import { FigureRow } from './panels/figure-row';
+import { FrameBar } from './panels/frame-bar';
+import { FrameTable } from './panels/frame-table';
+import { ObjectChoice, type ObjectEvents } from './panels/object-choice';
+import { TRACK_OPTIONS } from './panels/options';
+import { PreparationControls } from './panels/preparation';
+import { RegionControls, type RegionEvents } from './panels/region';
+import { VolumeCurve } from './panels/volume-curve';
+import type { TrackPreset, TrackVariant } from './presets';
+import type { Alternative, OpenedImage, ParamSpec, ParamValues, Preparation, Vec3 } from './protocol';
+import { TrackView, type TrackViewOptions } from './scene';
+
+export const INITIAL_VIEW: TrackViewOptions = {
+  surface: true,
+  edges: false,
+  votes: 'none',
+  region: true,
+  slices: 'walls',
+  below: 'slices',
+};
+
+export interface PartEvents extends RunEvents<TrackExample>, RegionEvents, ObjectEvents {
+  onVariant: (preset: TrackPreset, variant: TrackVariant) => void;
+  onPreparation: (preparation: Preparation, what: string) => void;
+  onOptions: (options: TrackViewOptions) => void;
+  onFrame: (frame: number) => void;
+  onMoved: () => void;
+  onCompare: (other: Alternative) => void;
+  onCancelCompare: () => void;
+  onSave: (what: 'frames' | 'animation' | 'table') => void;
+  onSculpt: () => void;
+}
+
+/** Controls and views of the Track lab. */
+export class TrackParts extends RunParts<TrackExample> {
+  readonly #slices = h('div', { class: 'slices' });
+  readonly view = new TrackView(this.canvas, this.#slices, INITIAL_VIEW);
+  readonly measures = new MeasurePanel(TRACK_ROWS);
+  readonly table = new FrameTable();
+  readonly options: OptionControls<TrackViewOptions>;
+  readonly preparation: PreparationControls;
+  readonly region: RegionControls;
+  readonly object: ObjectChoice;
+  readonly frames: FrameBar;
+  readonly curve: VolumeCurve;
+  readonly stills: FigureRow;
+  readonly compare: TrackComparePanel;
+  readonly #onParam: PartEvents['onParam'];
+  readonly #figure: FigurePanel<TrackVariant, TrackPreset>;
+  readonly #saves: HTMLButtonElement[];
+  readonly #sculpt: HTMLButtonElement;
+  readonly #thresholdHolder = h('div');
+  #threshold: EdgeThreshold | undefined;
+  /**
+   * Half width k, in voxels, of the windows in which the tracker finds the boundary; the preview of an edge threshold
+   * uses it.
+   */
+  #window = 2;
+
+  constructor(root: HTMLElement, history: History, client: TrackClient, signal: AbortSignal, events: PartEvents) {
+    super(root, signal, events, {
+      viewLabel: text('track.viewLabel'),
+      drop: text('track.drop'),
+      admission: 'frames',
+      data: imageData(fileChooser(events.onFiles, undefined, undefined, 'frames'), events.onExample),
+      ownControls: ['threshold'],
+      history,
+      fetchMesh: (request) => client.request('export', { ...request, frame: this.frames.frame }),
+    });
+    this.#onParam = events.onParam;
+    this.#figure = new FigurePanel<TrackVariant, TrackPreset>(events.onVariant);
+    this.preparation = new PreparationControls(events.onPreparation);
+    this.region = new RegionControls(events);
+    this.object = new ObjectChoice(events);
+    this.#slices.addEventListener('keydown', (event) => {
+      if (event.key === 'Enter' && event.target instanceof HTMLInputElement && event.target.type === 'range')
+        events.onHere();
+    });
+    this.frames = new FrameBar(events.onFrame);
+    const stopAt = (frame: number) => {
+      this.frames.stop();
+      events.onFrame(frame);
+    };
+    this.curve = new VolumeCurve(stopAt);
+    this.stills = new FigureRow((voxel: Vec3) => this.view.goToVoxel(voxel), stopAt);
+    this.compare = new TrackComparePanel({ onStart: events.onCompare, onCancel: events.onCancelCompare });
+    this.#saves = [
+      wideButton(text('track.saveFrames'), 'save-frames', () => events.onSave('frames')),
+      wideButton(text('track.saveAnimation'), 'save-animation', () => events.onSave('animation')),
+      wideButton(text('track.saveTable'), 'save-table', () => events.onSave('table')),
+    ];
+    this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
+    this.options = new OptionControls(TRACK_OPTIONS, INITIAL_VIEW, (options) => {
+      this.view.setOptions(options);
+      this.#slices.hidden = options.below !== 'slices';
+      this.stills.below = options.below;
+      events.onOptions(options);
+    });
+    this.view.onRegion = (region: VoxelBox) => events.onRegion(region);
+    this.view.onMoved = events.onMoved;
+    this.warnings.actions = { frame: stopAt, point: (point) => this.view.goTo(point) };
+    this.layOut({
+      name: 'track',
+      options: this.options.element,
+      over: [this.view.editing.legend.element],
+      stage: (view, status) => [
+        ...[view, this.frames.element, this.transport.element, status],
+        ...[this.object.element, this.#slices, this.stills.element],
+      ],
+      setup: [
+        section(text('track.sectionImage'), this.data.element, this.#figure.element),
+        section(text('track.sectionBoundary'), this.#thresholdHolder),
+        section(text('track.sectionRegion'), this.region.element),
+        folded(text('track.sectionPreparation'), this.preparation.element),
+        this.paramsSection(),
+      ],
+      results: [
+        section(text('track.sectionCurve'), this.curve.element, this.table.warnings),
+        section(text('track.sectionSurface'), this.warnings.element, this.measures.element),
+        this.saveSection(this.view.subject, ...this.#saves, this.#sculpt),
+        ...this.finishSections(this.view.editing, this.measures, () => this.frames.stop()),
+        folded(text('labs.frames'), this.table.element),
+        folded(text('track.sectionCompare'), this.compare.element),
+      ],
+    });
+  }
+
+  override makeParams(specs: ParamSpec[]): void {
+    super.makeParams(specs);
+    const threshold = specs.find(({ name }) => name === 'threshold');
+    if (!threshold || this.#threshold) return;
+    this.#threshold = new EdgeThreshold(
+      threshold,
+      (value) => this.#onParam('threshold', value),
+      (value) => this.view.preview(value, this.#window),
+    );
+    this.#thresholdHolder.replaceWith(this.#threshold.element);
+  }
+
+  override get surfaceWarnings(): readonly Warning[] {
+    return concerning(super.surfaceWarnings, { frame: this.frames.frame });
+  }
+
+  protected override get suffix(): string {
+    return `-${this.frames.frame + 1}`;
+  }
+
+  /** Shows the facts about a newly opened image. */
+  adopt(opened: OpenedImage, example: TrackExample | undefined, name: string): void {
+    const unit = example?.unit ?? unitOf(opened.volume);
+    this.saving.name = example?.id ?? name;
+    this.measures.unit = unit;
+    this.unit = unit;
+    this.surfaceSpace = spaceOf(opened.volume, unit);
+    this.data.show(factsOf(opened, name, unit), example);
+  }
+
+  showParams(params: ParamValues, noise: number, suggested: number, most: number): void {
+    this.#window = Number(params.window);
+    this.displayParams(params);
+    this.#threshold?.show(Number(params.threshold), noise, suggested, most);
+  }
+
+  showFigure(preset: TrackPreset | undefined, variant: TrackVariant | undefined): void {
+    this.#figure.show(preset, variant);
+  }
+
+  override refuseParam(name: string, message: string): void {
+    if (name === 'threshold') this.#threshold?.showError(message);
+    else super.refuseParam(name, message);
+  }
+
+  /**
+   * Enables and disables controls according to the lab's state. `tracked`: number of frames with a surface; `here`:
+   * whether the displayed frame has one.
+   */
+  showState(state: LabState, beneath: LabState, ready: boolean, tracked: number, here: boolean): void {
+    const idle = this.showRunState(state, beneath, ready, here);
+    this.exports.enabled = idle && here;
+    this.#sculpt.disabled = !idle || !here;
+    // While the lab asks for the object, there is nothing to run.
+    if (this.object.open) this.transport.showState(beneath, false);
+    this.object.enabled = idle;
+    this.region.enabled = idle;
+    for (const save of this.#saves) save.disabled = !idle || tracked === 0;
+    this.compare.enabled = idle && beneath === 'done';
+  }
+
+  override dispose(): void {
+    super.dispose();
+    this.frames.stop();
+    this.view.dispose();
+  }
+}

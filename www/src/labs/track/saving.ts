@@ -1,0 +1,53 @@
+import { zipSync } from 'three/addons/libs/fflate.module.js';
+import type { Unit } from '../../engine/protocol';
+import { concerning, type Warning } from '../../engine/warnings';
+import type { Saving } from '../../lab/saving';
+import type { SurfaceSpace } from '../../lab/surface-space';
+import type { TrackClient } from './client';
+import { framesCsv } from './measures';
+import type { TrackResults } from './results';
+
+/** A lab's page, as saving needs it. */
+interface Saver {
+  saving: Saving;
+  surfaceSpace: SurfaceSpace;
+  unit: Unit;
+  warnings: { all: readonly Warning[] };
+}
+
+/**
+ * Saves all tracked frames: their surfaces as PLY files in one ZIP archive, as one animation, or their measures as a
+ * table.
+ */
+export async function saveTrack(
+  what: 'frames' | 'animation' | 'table',
+  client: TrackClient,
+  { saving, surfaceSpace, unit, warnings: { all } }: Saver,
+  { frames, truth }: TrackResults,
+): Promise<void> {
+  if (what === 'table') saving.bytes('csv', new TextEncoder().encode(framesCsv(frames, truth, all, unit)), 'text/csv');
+  else if (what === 'animation')
+    saving.bytes('glb', await client.request('animation', surfaceSpace), 'model/gltf-binary');
+  else saving.bytes('zip', await archive(frames.length, client, surfaceSpace, all), 'application/zip');
+}
+
+async function archive(
+  frames: number,
+  client: TrackClient,
+  space: SurfaceSpace,
+  all: readonly Warning[],
+): Promise<Uint8Array> {
+  const files: Record<string, Uint8Array> = {};
+  const digits = String(frames).length;
+  for (let frame = 0; frame < frames; frame++) {
+    const name = `frame-${String(frame + 1).padStart(digits, '0')}.ply`;
+    files[name] = await client.request('export', {
+      ...space,
+      frame,
+      format: 'ply',
+      warnings: concerning(all, { frame }),
+    });
+  }
+  // Fast compression: coordinates hardly compress anyway.
+  return zipSync(files, { level: 1 });
+}
