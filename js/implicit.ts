@@ -2,11 +2,25 @@ import { checkProperties, denseCopy, finite, integer, numbers, pointArray, shall
 import type { Bytes, PointArray, Vec3 } from './data.js';
 import { type Mesh, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
-import { Runner, type RunOptions, type Stepper, type StepReport } from './stepper.js';
+import {
+  checkedSlices,
+  Runner,
+  type RunOptions,
+  runInSlices,
+  type SliceOptions,
+  type Stepper,
+  type StepReport,
+} from './stepper.js';
 import { RawCameras, RawImplicit } from './vesicle.js';
 import { type Volume, withWarnings, wrapVolume } from './volume.js';
 import type { Warning } from './warning.js';
 import { checkedWarnings, ModelWarnings } from './warnings.js';
+
+/** Long operations of an implicit surface in slices of work, as returned by {@link ImplicitSurface.inSlices}. */
+export interface ImplicitInSlices {
+  /** As {@link ImplicitSurface.toVolume}. */
+  toVolume(dims: Vec3): Promise<Volume>;
+}
 
 /**
  * Parameters of the implicit surface; `paramSpecs('implicit')` has their ranges, defaults and descriptions. The unit of
@@ -404,9 +418,37 @@ export class ImplicitSurface implements Stepper {
    *   not from 2 to 4096; `too-large`.
    */
   toVolume(dims: Vec3): Volume {
-    const sizes = Uint32Array.from(numbers('dims', dims, 3), (size) => integer('dims', size, { min: 2, max: 4096 }));
+    const sizes = gridSizes(dims);
     const warnings = this.#warnings.of();
     return wrapVolume(() => this.#handle.use((raw) => withWarnings(raw.toVolume(sizes), warnings)));
+  }
+
+  /**
+   * Returns long operations that yield to the event loop between slices of work and can be aborted. Results and errors are
+   * those of the methods of the same name, bit for bit; the surface may change meanwhile.
+   *
+   * @param options - `signal`: aborts operations, which reject with `signal.reason`; `budgetMs`: duration of a slice of
+   *   work, milliseconds, default 12.
+   * @throws {@link VesicleError} `invalid-argument`.
+   */
+  inSlices(options?: SliceOptions): ImplicitInSlices {
+    const { signal, budgetMs } = checkedSlices(options);
+    // Throws if the surface was freed.
+    this.#handle.use(() => undefined);
+    return {
+      toVolume: async (dims) => {
+        const sizes = gridSizes(dims);
+        signal?.throwIfAborted();
+        const warnings = this.#warnings.of();
+        const work = new Handle('ImplicitSurface', () => this.#handle.use((raw) => raw.toVolumeInSlices(sizes)));
+        try {
+          const raw = await runInSlices(() => work.use((one) => one.advance()), signal, budgetMs);
+          return wrapVolume(() => withWarnings(raw, warnings));
+        } finally {
+          work.free();
+        }
+      },
+    };
   }
 
   /**
@@ -513,4 +555,8 @@ function rawSurface(given: ImplicitOptions): RawImplicit {
     keepComponents,
     params,
   );
+}
+
+function gridSizes(dims: Vec3): Uint32Array {
+  return Uint32Array.from(numbers('dims', dims, 3), (size) => integer('dims', size, { min: 2, max: 4096 }));
 }

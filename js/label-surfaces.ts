@@ -202,7 +202,8 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
   }
 
   /**
-   * Changes any subset of the parameters. If the smoothing changes, all surfaces are smoothed again, from where they are.
+   * Changes any subset of the parameters. If the smoothing changes, all surfaces are smoothed again, from where they are; edges
+   * longer than a voxel are made by the last step.
    *
    * @throws {@link VesicleError} `invalid-argument` naming the parameter that is misspelled, of the wrong type or out of
    *   range. Nothing has changed then.

@@ -52,6 +52,9 @@ export const MOST_ENRICHED_OF_SMALL = 384 * 2 ** 20;
 /** Most bytes of intensities that an image of small files may be written as, if it has others than its voxels. */
 export const MOST_WRITTEN_OF_SMALL = 2 ** 28;
 
+/** The same, if they are compressed: repeated voxels are compressed fast, their intensities may not be. */
+export const MOST_COMPRESSED_OF_SMALL = 3 * 2 ** 23;
+
 /** Most voxels that an image of small files may be resampled to: more would take longer than a few seconds. */
 export const MOST_RESAMPLED_OF_SMALL = 50_000_000;
 

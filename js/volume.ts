@@ -19,6 +19,7 @@ import { Handle } from './runtime.js';
 import {
   isOfSmall,
   limitOf,
+  MOST_COMPRESSED_OF_SMALL,
   MOST_ENRICHED_OF_SMALL,
   MOST_RESAMPLED_OF_SMALL,
   MOST_WRITTEN_OF_SMALL,
@@ -161,14 +162,14 @@ export class Volume {
    *
    * @param options - `gzip`: compress; the whole file for NIfTI (`.nii.gz`), the voxels inside the file for the others.
    *   Default false.
-   * @throws {@link VesicleError} `invalid-argument`: another format; `too-large`, also for more than 256 MiB of intensities
-   *   in place of voxels that come from a file of at most 128 KiB: write those as NIfTI.
+   * @throws {@link VesicleError} `invalid-argument`: another format; `too-large`, also for more than 256 MiB of intensities,
+   *   24 MiB compressed, in place of voxels that come from a file of at most 128 KiB: write those as NIfTI.
    */
   toBytes(format: VolumeFormat, options: { gzip?: boolean } = {}): Bytes {
     choice('format', format, ['nifti', 'nrrd', 'mha']);
     const { gzip = false } = checkProperties('options', options, ['gzip']);
     boolean('gzip', gzip);
-    const most = limitOf(undefined, isOfSmall(this), MOST_WRITTEN_OF_SMALL);
+    const most = limitOf(undefined, isOfSmall(this), gzip ? MOST_COMPRESSED_OF_SMALL : MOST_WRITTEN_OF_SMALL);
     return this.#handle.use((raw) => raw.toBytes(format, gzip, most) as Bytes);
   }
 

@@ -157,7 +157,9 @@ class Host {
     lookUp(lookUp(SLICED, classOf(target as unknown as LibraryObject)), name);
     const given = this.#incoming(args);
     return this.#withSignal(id, (signal) => {
-      const operations = record((target as unknown as Mesh | Volume).inSlices({ ...options, signal }));
+      const operations = record(
+        (target as unknown as Mesh | Volume | ImplicitSurface).inSlices({ ...options, signal }),
+      );
       return (operations[name] as (...args: unknown[]) => Promise<unknown>)(...given);
     });
   }

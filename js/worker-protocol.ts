@@ -1,7 +1,7 @@
 // Messages between the page and the worker, and tables of the members that may be accessed. Nothing outside these
 // tables is ever called.
 import { VesicleError } from './error.js';
-import type { ErrorCode, MeshInSlices, VolumeInSlices } from './index.js';
+import type { ErrorCode, ImplicitInSlices, MeshInSlices, VolumeInSlices } from './index.js';
 import type { StepReport } from './stepper.js';
 import type { ClassName, FunctionName, Library } from './worker-types.js';
 
@@ -173,6 +173,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     fitness: 'method',
     preview: 'method',
     toVolume: 'method',
+    inSlices: 'method',
     colorize: 'method',
   },
   SurfaceTracker: {
@@ -211,7 +212,11 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
 };
 
 /** Operations of `inSlices` that the page may call in the worker, by class. */
-export const SLICED: { Mesh: Names<keyof MeshInSlices>; Volume: Names<keyof VolumeInSlices> } = {
+export const SLICED: {
+  Mesh: Names<keyof MeshInSlices>;
+  Volume: Names<keyof VolumeInSlices>;
+  ImplicitSurface: Names<keyof ImplicitInSlices>;
+} = {
   Mesh: {
     remesh: 'method',
     restructure: 'method',
@@ -226,6 +231,7 @@ export const SLICED: { Mesh: Names<keyof MeshInSlices>; Volume: Names<keyof Volu
     distanceTo: 'method',
   },
   Volume: { enrichSlices: 'method' },
+  ImplicitSurface: { toVolume: 'method' },
 };
 
 /** Static methods that the page may call in the worker, by class. */

@@ -83,6 +83,8 @@ type Members<T> = { [K in keyof T]: Member<T[K]> };
 export type MeshInSlices = Members<vesicle.MeshInSlices>;
 /** Those of `Volume.inSlices`. */
 export type VolumeInSlices = Members<vesicle.VolumeInSlices>;
+/** Those of `ImplicitSurface.inSlices`. */
+export type ImplicitInSlices = Members<vesicle.ImplicitInSlices>;
 
 type Member<T> = [T] extends [LibraryObject]
   ? WithRemotes<T>
@@ -90,9 +92,11 @@ type Member<T> = [T] extends [LibraryObject]
     ? Method<A, MeshInSlices>
     : [T] extends [(...args: infer A) => vesicle.VolumeInSlices]
       ? Method<A, VolumeInSlices>
-      : [T] extends [(...args: infer A) => infer R]
-        ? Method<Arguments<A>, Promise<WithRemotes<Awaited<R>>>>
-        : Promise<WithRemotes<T>>;
+      : [T] extends [(...args: infer A) => vesicle.ImplicitInSlices]
+        ? Method<A, ImplicitInSlices>
+        : [T] extends [(...args: infer A) => infer R]
+          ? Method<Arguments<A>, Promise<WithRemotes<Awaited<R>>>>
+          : Promise<WithRemotes<T>>;
 
 /**
  * Proxy of an object in the worker: methods and properties return promises; live meshes are available synchronously.

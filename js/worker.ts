@@ -119,6 +119,8 @@ export type TrackingOptions = there.WithRemotes<vesicle.TrackingOptions>;
 export type MeshInSlices = there.MeshInSlices;
 /** Those of a {@link Volume}. */
 export type VolumeInSlices = there.VolumeInSlices;
+/** Those of an {@link ImplicitSurface}. */
+export type ImplicitInSlices = there.ImplicitInSlices;
 
 export type Volume = there.Volume;
 export type Mesh = there.Mesh;

@@ -2,6 +2,7 @@
 
 use std::cell::{RefCell, RefMut};
 use std::rc::Rc;
+use std::task::Poll;
 
 use js_sys::{Float32Array, Uint8Array};
 use serde::Serialize;
@@ -13,9 +14,12 @@ use super::mesh::{RawMesh, triangle_list};
 use super::method::{method_bindings, shared};
 use super::volume::RawVolume;
 use vesicle::math::Vec3;
+use vesicle::methods::MethodError;
 use vesicle::methods::implicit::{
     Camera, Choice, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits,
 };
+use vesicle::pauses::{Computation, advance};
+use vesicle::volume::Volume;
 
 /// The raw handle of a list of cameras, whose images colour an implicit surface.
 #[wasm_bindgen]
@@ -173,6 +177,14 @@ impl RawImplicit {
         Ok(RawVolume(volume))
     }
 
+    /// Begins what `toVolume` does, in slices of work; the surface may change meanwhile.
+    #[wasm_bindgen(js_name = toVolumeInSlices)]
+    pub fn to_volume_in_slices(&self, dims: &[u32]) -> Result<RawSampling, JsValue> {
+        let dims: [u32; 3] = dims.try_into().map_err(|_| Failure::invalid("dims", "must be 3 integers"))?;
+        let begun = self.0.borrow().to_volume_in_slices(dims.map(|n| n as usize)).map_err(Failure::from)?;
+        Ok(RawSampling(Box::pin(begun)))
+    }
+
     /// Colours the vertices of the surface from the images of `cameras`.
     pub fn colorize(&self, cameras: RawCameras) -> Result<(), JsValue> {
         self.0.borrow_mut().colorize(&cameras.0).map_err(Failure::from)?;
@@ -218,4 +230,19 @@ struct Statistics {
     choice: Option<Choice>,
     #[serde(skip_serializing_if = "Option::is_none")]
     warning: Option<&'static str>,
+}
+
+/// A volume that is being sampled.
+#[wasm_bindgen]
+pub struct RawSampling(Computation<Result<Volume, MethodError>>);
+
+#[wasm_bindgen]
+impl RawSampling {
+    /// Does a slice of the work; returns the volume at the end, after which this must not be called any more.
+    pub fn advance(&mut self) -> Result<Option<RawVolume>, JsValue> {
+        match advance(&mut self.0) {
+            Poll::Pending => Ok(None),
+            Poll::Ready(volume) => Ok(Some(RawVolume(volume.map_err(Failure::from)?))),
+        }
+    }
 }

@@ -171,6 +171,23 @@ test('sampled as a volume it can be fitted by the deformable model', async () =>
   expect(model.mesh.info().volume / ((4 / 3) * Math.PI)).toBeGreaterThan(0.9);
 });
 
+test('it is sampled in slices to the same bits, although it changes meanwhile, and not if that is aborted', async () => {
+  const found = finished();
+  const whole = found.toVolume([40, 41, 42]);
+  const sampling = found.inSlices({ budgetMs: 0.01 }).toVolume([40, 41, 42]);
+  found.setParams({ delta: 9 });
+  const sliced = await sampling;
+  expect(sliced.intensities()).toEqual(whole.intensities());
+  expect(sliced.affine).toEqual(whole.affine);
+  const stop = new AbortController();
+  const other = finished();
+  const aborted = other.inSlices({ signal: stop.signal, budgetMs: 0.01 }).toVolume([100, 100, 100]);
+  setTimeout(() => stop.abort('enough'));
+  await expect(aborted).rejects.toBe('enough');
+  expect((await rejection(other.inSlices().toVolume([1, 9, 9]))).message).toContain('dims');
+  expect((await rejection(surface().inSlices().toVolume([9, 9, 9]))).message).toContain('solved');
+});
+
 test('colours from images and from points', () => {
   const found = finished();
   expect(found.mesh.arrays().colors).toBeUndefined();

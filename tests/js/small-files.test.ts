@@ -199,7 +199,11 @@ test('a small file with a slope is not written as many times its voxels', () => 
   for (const format of ['mha', 'nrrd'] as const)
     expect(failure(() => volume.toBytes(format))).toMatchObject({ code: 'too-large', message: /271669248 bytes/ });
   expect(volume.toBytes('nifti').length).toBe(352 + side ** 3);
-  volume.free();
+  const part = volume.crop({ min: [0, 0, 0], max: [200, 200, 200] });
+  expect(part.toBytes('nrrd').length).toBeGreaterThan(32e6);
+  for (const format of ['mha', 'nrrd'] as const)
+    expect(failure(() => part.toBytes(format, { gzip: true }))).toMatchObject({ code: 'too-large' });
+  for (const one of [part, volume]) one.free();
   const small = Volume.parse(plain);
   expect(small.toBytes('mha').length).toBeGreaterThan(32);
   small.free();

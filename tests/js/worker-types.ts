@@ -26,6 +26,8 @@ same<Same<ReturnType<worker.MeshInSlices['restructure']>, Promise<number>>>(true
 same<Same<ReturnType<worker.Mesh['inSlices']>, worker.MeshInSlices>>(true);
 same<Same<ReturnType<worker.VolumeInSlices['enrichSlices']>, Promise<worker.Volume>>>(true);
 same<Same<ReturnType<worker.Volume['inSlices']>, worker.VolumeInSlices>>(true);
+same<Same<ReturnType<worker.ImplicitInSlices['toVolume']>, Promise<worker.Volume>>>(true);
+same<Same<ReturnType<worker.ImplicitSurface['inSlices']>, worker.ImplicitInSlices>>(true);
 same<Same<ReturnType<worker.Mesh['toVolume']>, Promise<worker.Volume>>>(true);
 same<Same<Parameters<worker.Mesh['toVolume']>[0], worker.Volume>>(true);
 same<Same<ReturnType<worker.Mesh['contains']>, Promise<Uint8Array>>>(true);

@@ -147,7 +147,8 @@ const SCENES: Record<string, (library: Library) => Promise<unknown>> = {
     const { residual } = await surface.run();
     await surface.setEdits({ added: Float32Array.of(0, 0, 1.2) });
     await surface.run();
-    const volume = await surface.toVolume([12, 12, 12]);
+    const volume = await surface.inSlices().toVolume([12, 12, 12]);
+    expect(await volume.intensities()).toEqual(await (await surface.toVolume([12, 12, 12])).intensities());
     const next = new DeformableModel({ volume, params: { iso: 0, isoForce: -1 } });
     await next.step(3);
     return [

@@ -7,6 +7,7 @@ use super::measure::Fitness;
 use super::{ImplicitSurface, Solved, cameras_at, color};
 use crate::math::{Bounds, DAffine3, DVec3, PositionIndex, Vec3};
 use crate::methods::MethodError;
+use crate::pauses::{Pauses, finished};
 use crate::volume::{Volume, VolumeError, VolumeInit, Voxels};
 
 impl ImplicitSurface {
@@ -79,6 +80,18 @@ impl ImplicitSurface {
     /// [`MethodError::InvalidArgument`] before the system is solved, and for fewer than 2 voxels along an axis;
     /// [`MethodError::Volume`] if memory cannot be allocated.
     pub fn to_volume(&self, dims: [usize; 3]) -> Result<Volume, MethodError> {
+        finished(self.to_volume_in_slices(dims)?)
+    }
+
+    /// Begins to sample the implicit function as [`Self::to_volume`] does, in [slices](crate::pauses); the surface is not
+    /// needed any more.
+    ///
+    /// # Errors
+    /// As [`Self::to_volume`]: of the arguments at once.
+    pub fn to_volume_in_slices(
+        &self,
+        dims: [usize; 3],
+    ) -> Result<impl Future<Output = Result<Volume, MethodError>> + use<>, MethodError> {
         let solved = self.solved("toVolume")?;
         if dims.iter().any(|&n| n < 2) {
             return Err(MethodError::invalid(
@@ -88,19 +101,21 @@ impl ImplicitSurface {
         }
         let (origin, spacing) = self.grid(dims);
         let map = DAffine3::from_translation(origin) * DAffine3::from_scale(spacing);
-        let corner = |p: DVec3| self.map.in_box_exactly(map.transform_point3(p));
+        let (in_box, level) = (self.map, self.iso_value(solved));
+        let affine = DAffine3::from_translation(self.origin) * map;
+        let corner = move |p: DVec3| in_box.in_box_exactly(map.transform_point3(p));
         let last = DVec3::from_array(dims.map(|n| (n - 1) as f64));
         let mut fast = FastField::new(solved.field.clone(), corner(DVec3::ZERO), corner(last));
-        let level = self.iso_value(solved);
-        let values = sampled(dims, |points, row| {
-            let points: Vec<DVec3> = points.iter().map(|&p| corner(p)).collect();
-            fast.values(&points, row);
-            row.iter_mut().for_each(|value| *value -= level);
-        })?;
-        Ok(Volume::new(VolumeInit {
-            affine: DAffine3::from_translation(self.origin) * map,
-            ..VolumeInit::new(Voxels::F32(values), [dims[0], dims[1], dims[2], 1])
-        })?)
+        Ok(async move {
+            let row = |points: &[DVec3], row: &mut [f64]| {
+                let points: Vec<DVec3> = points.iter().map(|&p| corner(p)).collect();
+                fast.values(&points, row);
+                row.iter_mut().for_each(|value| *value -= level);
+            };
+            let values = sampled(dims, row).await?;
+            let dims = [dims[0], dims[1], dims[2], 1];
+            Ok(Volume::new(VolumeInit { affine, ..VolumeInit::new(Voxels::F32(values), dims) })?)
+        })
     }
 
     /// Returns the centre of the first voxel and the voxel size, in world units, of a grid of `dims` voxels around the
@@ -139,17 +154,24 @@ impl ImplicitSurface {
 /// Margin around points and surface in [`ImplicitSurface::to_volume`], as a share of the longest side of the points'
 /// bounding box: enough for the surface to close.
 const GRID_MARGIN: f64 = 0.1;
+/// Number of nodes of a grid that count as a unit of work.
+const NODES_PER_UNIT: usize = 16;
 
 /// Returns the values of a function at all nodes of a grid of `dims` nodes, x fastest. `row` writes the values of a row
 /// of nodes along x, given their positions in voxels. Fails with [`VolumeError::TooLarge`] if memory cannot be
 /// allocated.
-fn sampled(dims: [usize; 3], mut row: impl FnMut(&[DVec3], &mut [f64])) -> Result<Vec<f32>, VolumeError> {
+async fn sampled(
+    dims: [usize; 3],
+    mut row: impl FnMut(&[DVec3], &mut [f64]),
+) -> Result<Vec<f32>, VolumeError> {
     let bytes = dims.iter().fold(4, |product: u64, &n| product.saturating_mul(n as u64));
     let count = usize::try_from(bytes / 4).unwrap_or(usize::MAX);
     let mut values: Vec<f32> = Vec::new();
     values.try_reserve_exact(count).map_err(|_| VolumeError::TooLarge { bytes })?;
+    let pauses = Pauses::default();
     let (mut points, mut line) = (vec![DVec3::ZERO; dims[0]], vec![0.0; dims[0]]);
     for at in 0..dims[1] * dims[2] {
+        pauses.after(1 + dims[0] / NODES_PER_UNIT).await;
         let [y, z] = [at % dims[1], at / dims[1]].map(|k| k as f64);
         points.iter_mut().enumerate().for_each(|(x, p)| *p = DVec3::new(x as f64, y, z));
         row(&points, &mut line);

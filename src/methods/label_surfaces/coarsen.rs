@@ -28,8 +28,11 @@ use std::collections::{BTreeMap, BinaryHeap};
 const TILE: f64 = 8.0;
 /// Largest distance of two cells that are merged, in edge lengths.
 const MERGED: f32 = 1.0;
-/// Work that a tile counts as.
+/// Work that a tile counts as, whatever is in it.
 const TILE_WORK: usize = 50;
+/// Work that a cell of a tile counts as, and an attempt to merge one.
+const CELL_WORK: usize = 1;
+const MERGE_WORK: usize = 3;
 /// Length of the longest edge that merges may create, in edge lengths.
 const LONGEST: f32 = 1.5;
 /// Weight of the squared distance of the remaining vertex from the planes of the triangles that are replaced, relative to
@@ -46,7 +49,7 @@ const MOST_TRIANGLES: usize = 16;
 const ROUNDS: u32 = 3;
 /// Six times the volume of a tetrahedron below which it counts as flat, in voxels.
 const FLAT: f64 = 1e-4;
-/// Number of triangles whose boxes have a common box, which is tested first.
+/// Number of triangles whose boxes have a common box, which is tested first, and of such boxes that have one in turn.
 const GROUP: usize = 16;
 /// Stands for a vertex that is not in a cell, or a cell that is not in the tile.
 const NONE: u32 = u32::MAX;
@@ -163,8 +166,8 @@ impl Coarsening {
                     // Triangles reach from one tile of the first pass to the next only as far as they are not changed.
                     let around = area.grown(if pass == 0 { 1 } else { side / 2 }, nets.grid.dims());
                     let before = if pass == 0 { &Merges::default() } else { &self.passes[0] };
-                    let mut tile = Tile::new(nets, area, &around, before, &mut index);
-                    tile.run(edge as f32);
+                    let mut tile = Tile::new(nets, area, &around, before, &mut index, pauses).await;
+                    tile.run(edge as f32, pauses).await;
                     let nodes = std::mem::take(&mut tile.nodes);
                     for node in nodes.iter().filter(|node| area.contains(node.at)) {
                         self.passes[pass].set(node.slot, remaining(&nodes, node).slot, node.shift);
@@ -218,6 +221,7 @@ impl Nets {
             coarse.finish(self, reconnected);
             self.coarse = coarse;
         } else {
+            coarse.pending = None;
             coarse.passes = Default::default();
             coarse.passes[0].resize(coarse.result.targets.len());
             coarse.finish(self, reconnected);
@@ -280,27 +284,44 @@ struct Tile<'a> {
     triangles: Vec<Piece>,
     /// Box of each triangle; empty if it has been removed.
     bounds: Vec<Bounds>,
-    /// A box around those of each [`GROUP`] triangles.
-    groups: Vec<Bounds>,
+    /// Boxes around those of each [`GROUP`] triangles, then around these, and so on, up to a few.
+    groups: Vec<Vec<Bounds>>,
     queue: BinaryHeap<Reverse<Candidate>>,
 }
 
 impl<'a> Tile<'a> {
     /// Collects what is in and around the tile `area`, from the polygons that begin at the cells of `around`, after the
     /// merges `before`. `index` has [`NONE`] for each slot, and has so again afterwards.
-    fn new(nets: &'a Nets, area: CellBox, around: &CellBox, before: &'a Merges, index: &mut [u32]) -> Self {
+    async fn new(
+        nets: &'a Nets,
+        area: CellBox,
+        around: &CellBox,
+        before: &'a Merges,
+        index: &mut [u32],
+        pauses: &Pauses,
+    ) -> Self {
         let (nodes, vertices, triangles, bounds, groups, queue) = Default::default();
         let mut tile = Self { nets, before, area, nodes, vertices, triangles, bounds, groups, queue };
         let mut others = BTreeMap::new();
         for slot in nets.cells.within(around) {
+            pauses.after(CELL_WORK).await;
             for crossing in nets.crossings(slot) {
                 tile.add_polygons(&crossing, index, &mut others);
             }
         }
         tile.nodes.iter().for_each(|node| index[node.slot as usize] = NONE);
-        let union = |group: &[Bounds]| group.iter().fold(Bounds::EMPTY, |all, one| all.union(one));
-        tile.groups = tile.bounds.chunks(GROUP).map(union).collect();
+        tile.group();
         tile
+    }
+
+    /// Puts boxes around the boxes of the triangles, and around these.
+    fn group(&mut self) {
+        let union = |group: &[Bounds]| group.iter().fold(Bounds::EMPTY, |all, one| all.union(one));
+        let mut last = &self.bounds;
+        while last.len() > GROUP {
+            self.groups.push(last.chunks(GROUP).map(union).collect());
+            last = &self.groups[self.groups.len() - 1];
+        }
     }
 
     /// Adds the triangles of the polygons around an edge of the grid, as far as they may reach into the tile.
@@ -432,9 +453,10 @@ impl<'a> Tile<'a> {
     }
 
     /// Merges cells in the order of their costs, as far as edges are shorter than `edge`.
-    fn run(&mut self, edge: f32) {
+    async fn run(&mut self, edge: f32, pauses: &Pauses) {
         for _ in 0..ROUNDS {
             for node in 0..self.nodes.len() as u32 {
+                pauses.after(CELL_WORK).await;
                 for other in self.neighbours(node) {
                     self.enqueue(node, other, edge);
                 }
@@ -445,6 +467,7 @@ impl<'a> Tile<'a> {
                 let pair = [from, to].map(|node| &self.nodes[node as usize]);
                 let is_current = pair.iter().all(|node| node.target == NONE);
                 if is_current && pair[0].stamp + pair[1].stamp == candidate.stamp {
+                    pauses.after(MERGE_WORK).await;
                     merges += u32::from(self.merge(from, to, edge));
                 }
             }
@@ -521,7 +544,11 @@ impl<'a> Tile<'a> {
         };
         for (triangle, piece) in fresh {
             let (i, bounds) = (triangle as usize, Bounds::from_points(&piece.points));
-            self.groups[i / GROUP] = self.groups[i / GROUP].union(&bounds);
+            let mut group = i;
+            for level in &mut self.groups {
+                group /= GROUP;
+                level[group] = level[group].union(&bounds);
+            }
             (self.bounds[i], self.triangles[i]) = (bounds, piece);
         }
         true
@@ -670,16 +697,35 @@ impl<'a> Tile<'a> {
             corners.contains(&removed) || is_shifted && corners.contains(&kept)
         };
         let stays = |piece: &Piece| !pairs.iter().any(|pair| changes(pair, &piece.corners));
-        let meets_others = |(bounds, other): (&Bounds, &Piece)| {
-            bounds.overlaps(&around)
-                && stays(other)
-                && near(bounds).into_iter().any(|piece| meet(piece, other))
+        let meets_others = |triangle: usize| {
+            let (bounds, other) = (&self.bounds[triangle], &self.triangles[triangle]);
+            stays(other) && near(bounds).into_iter().any(|piece| meet(piece, other))
         };
-        let groups = self.groups.iter().zip(self.bounds.chunks(GROUP).zip(self.triangles.chunks(GROUP)));
-        groups
-            .filter(|(group, _)| group.overlaps(&around))
-            .any(|(_, (bounds, triangles))| bounds.iter().zip(triangles).any(meets_others))
+        self.any_overlapping(&around, meets_others)
             || fresh.iter().enumerate().any(|(i, (_, s))| fresh[..i].iter().any(|(_, t)| meet(s, t)))
+    }
+
+    /// Returns whether any triangle whose box overlaps another one is as asked.
+    fn any_overlapping(&self, around: &Bounds, is_wanted: impl Fn(usize) -> bool) -> bool {
+        let mut waiting: SmallVec<[(usize, usize); 64]> = SmallVec::new();
+        // Level 0 is that of the triangles.
+        let boxes = |level: usize| if level == 0 { &self.bounds } else { &self.groups[level - 1] };
+        let top = self.groups.len();
+        waiting.extend((0..boxes(top).len()).map(|index| (top, index)));
+        while let Some((level, index)) = waiting.pop() {
+            if !boxes(level)[index].overlaps(around) {
+                continue;
+            }
+            if level == 0 {
+                if is_wanted(index) {
+                    return true;
+                }
+                continue;
+            }
+            let end = boxes(level - 1).len().min((index + 1) * GROUP);
+            waiting.extend((index * GROUP..end).map(|below| (level - 1, below)));
+        }
+        false
     }
 
     fn facet(&self, piece: &Piece) -> Facet {

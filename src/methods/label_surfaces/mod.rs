@@ -302,7 +302,8 @@ impl LabelSurfaces {
         &self.params
     }
 
-    /// Replaces the parameters. If the smoothing changes, all surfaces are smoothed again, from where they are.
+    /// Replaces the parameters. If the smoothing changes, all surfaces are smoothed again, from where they are; longer
+    /// edges are made by the last step.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`]; nothing has changed then.
@@ -315,9 +316,16 @@ impl LabelSurfaces {
         if self.params.edge != before.edge {
             let mut reconnected = self.nets.no_labels();
             let everywhere = self.nets.everywhere();
-            finished(self.coarsen(everywhere, &[], &mut reconnected, &Pauses::default()));
+            finished(self.nets.coarsen(
+                self.params.edge,
+                &everywhere,
+                true,
+                &mut reconnected,
+                &Pauses::default(),
+            ));
             self.versions.record(&[], &reconnected);
-            if self.zone.is_none() {
+            self.off.clear();
+            if self.is_settled() {
                 self.measure_all();
             }
         }
@@ -386,7 +394,12 @@ impl LabelSurfaces {
             self.nets.flag_labels_in(untangled.iter().copied(), &mut reconnected);
             let start = self.note("intersections", &mut times, start);
             pauses.after(zone.moving()).await;
-            let seen = if is_last { zone.numbers() } else { Vec::new() };
+            let mut seen = if is_last { zone.numbers() } else { Vec::new() };
+            if is_last && let Some(area) = self.nets.coarse.pending {
+                seen.extend(self.nets.numbers_within(&area));
+                seen.sort_unstable();
+                seen.dedup();
+            }
             self.zone = (!is_last).then_some(zone);
             self.coarsen(area, &untangled, &mut reconnected, &pauses).await;
             let start = self.note("coarsening", &mut times, start);
@@ -396,8 +409,27 @@ impl LabelSurfaces {
                 self.note("volumes", &mut times, start);
             }
             self.versions.record(&moved, &reconnected);
+        } else if let Some(area) = self.nets.coarse.pending {
+            self.steps += 1;
+            let start = (self.clock)();
+            self.coarsen_alone(area, &pauses).await;
+            self.note("coarsening", &mut times, start);
         }
         Ok(self.report(times))
+    }
+
+    /// Coarsens smooth surfaces in a box, where edges are to be longer.
+    async fn coarsen_alone(&mut self, area: CellBox, pauses: &Pauses) {
+        let mut reconnected = self.nets.no_labels();
+        self.coarsen(area, &[], &mut reconnected, pauses).await;
+        let seen = self.nets.numbers_within(&area);
+        self.measure(&seen, &[], pauses).await;
+        self.versions.record(&[], &reconnected);
+    }
+
+    /// Returns whether the next step would change nothing.
+    fn is_settled(&self) -> bool {
+        self.zone.is_none() && self.nets.coarse.pending.is_none()
     }
 
     /// Returns the labels in a zone that are thin and whose volumes may be off, and those that meet them, in ascending
@@ -471,13 +503,14 @@ impl LabelSurfaces {
     }
 
     fn report(&self, times: Times) -> StepReport {
-        let done = self.zone.is_none();
+        let done = self.is_settled();
         let [vertices, triangles] = LiveSurface::counts(self);
         let share = f64::from(self.iterations) / f64::from(self.params.smoothing.max(1));
+        let phase = if self.zone.is_some() { "smoothing" } else { "coarsening" };
         StepReport {
             iteration: self.steps,
             done,
-            phase: if done { "done" } else { "smoothing" }.into(),
+            phase: if done { "done" } else { phase }.into(),
             progress: if done { 1.0 } else { share.min(1.0) },
             residual: self.residual,
             tolerance: 0.0,

@@ -18,6 +18,7 @@ use crate::mesh::grid_origin;
 use crate::methods::MethodError;
 use crate::pauses::{Pauses, finished};
 use crate::volume::VolumeError;
+use std::collections::BTreeSet;
 
 /// Largest number of cells through which surfaces pass; more take more than a gigabyte. Labels of noise have as many in 200³
 /// voxels.
@@ -140,6 +141,14 @@ impl Nets {
         }
         nets.list(everywhere, &changed, pauses).await;
         Ok(nets)
+    }
+
+    /// Returns the numbers of the labels in the cells of a box, in ascending order.
+    pub fn numbers_within(&self, area: &CellBox) -> Vec<u16> {
+        let slots = self.cells.within(area);
+        let numbers: BTreeSet<u16> =
+            slots.into_iter().flat_map(|slot| self.cells.get(slot).numbers()).collect();
+        numbers.into_iter().collect()
     }
 
     /// Returns the number of cells through which surfaces pass; an error if there are more than `most`.

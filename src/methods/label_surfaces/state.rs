@@ -85,11 +85,12 @@ impl LabelSurfaces {
             finished(self.wake(CellBox { low, high }, &pauses));
         }
         if let Some([low, high]) = state.pending {
-            finished(self.coarsen(CellBox { low, high }, &[], &mut [], &pauses));
+            let (edge, area) = (self.params.edge, CellBox { low, high });
+            finished(self.nets.coarsen(edge, &area, true, &mut [], &pauses));
         }
         (self.iterations, self.steps, self.residual) = (state.iterations, state.steps, state.residual);
         self.off.clear();
-        if self.zone.is_none() {
+        if self.is_settled() {
             self.measure_all();
         }
         self.versions.record_all(self.nets.grid.values().len());

@@ -28,6 +28,9 @@ import { saveMap, saveSurfaces } from './saving';
 /** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
 const MASK_DELAY = 120;
 
+/** Milliseconds after which the surfaces are said to follow a change: mostly they have then. */
+const SAID_AFTER = 500;
+
 /** Overlays before there are labels. */
 const NO_OVERLAYS: Pick<Overlays, 'colors' | 'names' | 'paint' | 'mask'> = {
   colors: new Map(),
@@ -54,6 +57,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   /** Range of intensities of the mask that the editing has, as text; undefined if it has none. */
   #maskRange: string | undefined;
   #maskTimer = 0;
+  #busyTimer = 0;
   /** Time in milliseconds at which the last stroke ended; undefined once its surfaces are drawn. */
   #released: number | undefined;
   /** Whether the last fill has reached no voxel. */
@@ -77,7 +81,10 @@ export class SegmentLab extends LabShell<SegmentExample> {
         ui.warnings.showReport(update);
         this.#take(update, smooth);
       },
-      onBusy: () => states.setModelState('running'),
+      onBusy: () => {
+        states.setModelState('running');
+        this.#sayLater(text('segment.following'));
+      },
       onNothing: (reason) => {
         this.#isUnfilled = true;
         this.#released = undefined;
@@ -88,7 +95,10 @@ export class SegmentLab extends LabShell<SegmentExample> {
         else this.work.settled('painted');
         ui.tools.showUndo(undoable, redoable);
       },
-      onError: (title, error) => states.fail(title, error),
+      onError: (title, error) => {
+        clearTimeout(this.#busyTimer);
+        states.fail(title, error);
+      },
     });
     this.opening = new SegmentOpening(this.client, ui, states, {
       adopt: (opened, source, reopening) => this.#adopt(opened, source, reopening),
@@ -100,6 +110,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
 
   protected override closed(): void {
     clearTimeout(this.#maskTimer);
+    clearTimeout(this.#busyTimer);
     delete this.root.dataset.tool;
   }
 
@@ -241,9 +252,18 @@ export class SegmentLab extends LabShell<SegmentExample> {
       });
   }
 
+  /** Says what is under way, unless it is over soon, as after a stroke. */
+  #sayLater(what: string): void {
+    clearTimeout(this.#busyTimer);
+    this.#busyTimer = window.setTimeout(() => {
+      if (this.states.value === 'running') this.ui.status.say(what);
+    }, SAID_AFTER);
+  }
+
   /** Ends a change, when its smooth surfaces are drawn, unless another one has begun. */
   #settle(): void {
     if (this.#editing.isBusy) return;
+    clearTimeout(this.#busyTimer);
     if (this.#released !== undefined) this.#latency = { ...this.#latency, smooth: performance.now() - this.#released };
     this.#released = undefined;
     this.#showMeasures();
