@@ -726,6 +726,29 @@ fn creation_pauses_in_each_of_its_parts() {
 }
 
 #[test]
+fn longer_edges_are_made_by_a_step_that_pauses_within_a_tile() {
+    let mut surfaces = settled(&dust(28));
+    let fine = surfaces.surface();
+    // A tile is larger than the volume.
+    surfaces.set_params(LabelParams { edge: 4.0, ..LabelParams::default() }).unwrap();
+    assert!(surfaces.surface() == fine);
+    let mut copy = LabelSurfaces::new(&dust(28), None, LabelParams::default()).unwrap();
+    copy.restore(&surfaces.save()).unwrap();
+    let mut step = Box::pin(surfaces.step_in_slices());
+    let mut pauses = 0;
+    while advance(&mut step).is_pending() {
+        pauses += 1;
+    }
+    drop(step);
+    // A unit for each of the cells in each round, and some for each of the many merges that are tried.
+    assert!(pauses > 2 * 28_usize.pow(3) / 500, "{pauses}");
+    check(&surfaces, "coarse");
+    assert!(surfaces.surface().triangles.len() < fine.triangles.len());
+    assert!(copy.step().unwrap().done);
+    assert!(copy.surface() == surfaces.surface());
+}
+
+#[test]
 fn surfaces_everywhere_in_a_large_volume_are_refused() {
     let refusal = LabelSurfaces::new(&dust(205), None, LabelParams::default()).err().unwrap().to_string();
     assert!(refusal.starts_with("volume: ") && refusal.contains("8000000 cells"), "{refusal}");
