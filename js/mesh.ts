@@ -25,6 +25,7 @@ import type {
   SpaceOptions,
   Vec3,
 } from './data.js';
+import { mark, notA } from './kind.js';
 import {
   checkedFileOptions,
   checkedSpaceOptions,
@@ -44,7 +45,7 @@ import * as glue from './vesicle.js';
 import { type RawArrays, RawExtra, RawMesh, type RawMeshWork, type RawVolume } from './vesicle.js';
 import { type Volume, volumeHandle, withWarnings, wrapVolume } from './volume.js';
 import type { Warning } from './warning.js';
-import { checkedWarnings, mergedWarnings, notesOf, recentred } from './warnings.js';
+import { beyondRange, checkedWarnings, mergedWarnings, notesOf, recentred } from './warnings.js';
 
 /** Vertices and triangles of a mesh as packed arrays, for drawing and further processing; see {@link Mesh.arrays}. */
 export interface MeshArrays {
@@ -273,8 +274,9 @@ export class Mesh {
     wrapMesh = (...parts) => new Mesh(...parts);
     meshHandle = (parameter, mesh) => {
       if (mesh instanceof Mesh) return mesh.#handle;
-      throw invalid(parameter, 'must be a Mesh');
+      throw notA('Mesh', parameter, mesh);
     };
+    mark(Mesh.prototype, 'Mesh');
   }
 
   private constructor(
@@ -383,7 +385,7 @@ export class Mesh {
     return handle.use((raw) =>
       made(() => RawMesh.marchingCubes(raw, iso, frame, most), {
         ...frameOf(volume),
-        warnings: inFrame(volume.warnings, frame),
+        warnings: [...inFrame(volume.warnings, frame), ...beyondRange(volume, iso)],
       }),
     );
   }

@@ -14,6 +14,7 @@ import {
   vec3,
 } from './check.js';
 import type { Bytes, LengthUnit, Space, Vec3, VolumeFileOptions, VolumeInit, VoxelArray } from './data.js';
+import { mark, notA } from './kind.js';
 import { Handle } from './runtime.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
 import {
@@ -73,8 +74,9 @@ export class Volume {
     wrapVolume = wrap;
     volumeHandle = (parameter, volume) => {
       if (volume instanceof Volume) return volume.#handle;
-      throw invalid(parameter, 'must be a Volume');
+      throw notA('Volume', parameter, volume);
     };
+    mark(Volume.prototype, 'Volume');
   }
 
   /**

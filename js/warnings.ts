@@ -66,6 +66,13 @@ export function mergedWarnings(...lists: readonly (readonly Warning[])[]): Warni
   return [...found.values()];
 }
 
+/** Returns the warning about an iso value that no surface of a volume has. */
+export function beyondRange({ range: [low, high] }: { range: [number, number] }, iso: number): Warning[] {
+  if (iso >= low && iso <= high) return [];
+  const text = `no surface has the iso value ${iso}: the intensities of the volume are from ${low} to ${high}`;
+  return [{ code: 'no-boundary', text }];
+}
+
 /** Returns the warning about a surface in a file that was moved by -`origin`; none if that is 0. */
 export function recentred(origin: Vec3): Warning[] {
   if (origin.every((coordinate) => coordinate === 0)) return [];

@@ -1,8 +1,10 @@
 // The page's proxies of the objects in the worker.
+
 import { onAbort } from './abort.js';
 import { checkProperties, invalid } from './check.js';
 import { type CoverageOptions, checkedCoverage } from './coverage.js';
 import { VesicleError } from './error.js';
+import { mark } from './kind.js';
 import type { MeshArrays, PositionOptions } from './mesh.js';
 import { checkedRun, checkedSlices, type RunOptions, type SliceOptions } from './stepper.js';
 import {
@@ -293,6 +295,7 @@ function remoteClass(name: ClassName): Class {
     },
   };
   const proxy = named[name] as unknown as Class;
+  mark(proxy.prototype, name, true);
   for (const method of Object.keys(STATICS[name])) {
     const call = async (...args: unknown[]) => post(currentSession(), name, method, args);
     define(proxy, method, { value: method === 'propose' ? propose : call });

@@ -2,6 +2,7 @@
 import { choice, invalid } from '../check.js';
 import type { Space, Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
+import { notA } from '../kind.js';
 import type { MeshArrays, PositionOptions } from '../mesh.js';
 import type { Warning } from '../warning.js';
 
@@ -113,7 +114,7 @@ export class MeshReader {
 function checkSource(mesh: MeshSource): void {
   const { topologyVersion, geometryVersion, arrays } = Object(mesh) as Partial<MeshSource>;
   if (typeof arrays === 'function' && Number.isFinite(topologyVersion) && Number.isFinite(geometryVersion)) return;
-  throw invalid('mesh', 'must be a Mesh, or an object with arrays(), topologyVersion and geometryVersion');
+  throw notA('Mesh', 'mesh', mesh, ', or an object with arrays(), topologyVersion and geometryVersion');
 }
 
 // Arrays owned by others must not be rotated in place.

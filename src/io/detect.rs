@@ -1,6 +1,7 @@
 //! Detection of the format of a volume file from its bytes.
 
 use super::gzip::{gunzip_start, is_gzip};
+use super::mesh_file::known_format;
 use super::{FormatError, VolumeOptions, metaimage, nifti, nrrd};
 use crate::volume::Volume;
 
@@ -75,9 +76,7 @@ fn signature(bytes: &[u8]) -> &'static str {
         () if at(0, b"CDF") => "NetCDF or MINC",
         () if at(0, b"PK\x03\x04") => "zip",
         () if at(0, b"BZh") => "bzip2",
-        () if line(b"<?xml") || line(b"<VTKFile") => "XML",
-        () if at(0, b"# vtk") => "VTK legacy",
         () if at(0, b"\x89PNG") || at(0, &[0xFF, 0xD8, 0xFF]) => "an image file (PNG or JPEG)",
-        () => "an unknown signature",
+        () => known_format(bytes).unwrap_or("an unknown signature"),
     }
 }

@@ -773,7 +773,8 @@ fn an_image_of_one_intensity_is_told() {
     let codes = |values: Vec<f32>| {
         let volume = Volume::new(VolumeInit::new(Voxels::F32(values), [6, 6, 6, 2])).unwrap();
         [0, 1].map(|frame| {
-            let options = DeformableOptions { frame, ..Default::default() };
+            let params = Some(DeformableParams { iso: 8.0, ..Default::default() });
+            let options = DeformableOptions { frame, params, ..Default::default() };
             let report = DeformableModel::new(&volume, options).unwrap().step().unwrap();
             report.warnings.into_iter().map(|warning| warning.code).collect::<Vec<_>>()
         })
@@ -783,6 +784,30 @@ fn an_image_of_one_intensity_is_told() {
     let mut values = vec![7.0; 432];
     values[86] = 9.0;
     assert_eq!(codes(values), [vec![], flat]);
+}
+
+#[test]
+fn an_iso_value_that_no_surface_has_is_told() {
+    let volume =
+        Volume::new(VolumeInit::new(Voxels::U8((0..216).map(|i| 7 + (i % 5) as u8).collect()), [6, 6, 6, 1]));
+    let volume = volume.unwrap();
+    let warnings = |params| {
+        let options = DeformableOptions { params: Some(params), ..Default::default() };
+        DeformableModel::new(&volume, options).unwrap().step().unwrap().warnings
+    };
+    let with = |iso, iso_force| DeformableParams { iso, iso_force, ..Default::default() };
+    for iso in [7.0, 9.5, 11.0] {
+        assert_eq!(warnings(with(iso, -1.0)), []);
+    }
+    for iso in [6.9, 11.1] {
+        let [warning] = &warnings(with(iso, -1.0))[..] else { panic!("{iso}") };
+        assert_eq!(warning.code, WarningCode::NoBoundary);
+        assert!(
+            warning.text.contains(&format!("{iso}: ")) && warning.text.contains("7 to 11"),
+            "{warning:?}"
+        );
+        assert_eq!(warnings(with(iso, 0.0)), [], "it has no effect");
+    }
 }
 
 #[test]

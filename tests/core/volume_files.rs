@@ -234,6 +234,7 @@ fn unsupported_formats_and_contents_are_named() {
     );
     assert!(message(b"").contains("signature"));
     assert!(message(b"a letter to a friend\n").contains("unknown signature"));
+    assert!(message(b"<!DOCTYPE html><title>404</title>").contains("a web page in place of the file"));
     assert!(message(made!("pair.img")).contains("unknown signature"));
     for header in [made!("pair.hdr"), made!("detached.nhdr"), made!("detached.mhd")] {
         assert!(message(header).contains("; pass "));

@@ -19,6 +19,17 @@ function joined(a: MeshArrays, b: MeshArrays, shift: number): Mesh {
   );
 }
 
+test('an iso value that no surface has gives none, with a warning', () => {
+  const volume = ball(8, 3);
+  const [low, high] = volume.range;
+  for (const iso of [low - 1, high + 1]) {
+    const mesh = Mesh.marchingCubes(volume, iso);
+    const text = expect.stringContaining(`${low} to ${high}`);
+    expect([mesh.vertexCount, mesh.warnings]).toEqual([0, [{ code: 'no-boundary', text }]]);
+  }
+  expect(Mesh.marchingCubes(volume, (low + high) / 2).warnings).toEqual([]);
+});
+
 test('an icosphere is a sphere', () => {
   const mesh = sphere(2, 0.2);
   const info = mesh.info();

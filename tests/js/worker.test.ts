@@ -270,6 +270,10 @@ test('an object whose construction fails rejects all calls, and create itself re
   const made = await worker.Volume.create({ data, dims: DIMS });
   expect(await made.dims).toEqual(DIMS);
   expect((await rejection(wrong(new (wrong(worker.Mesh))()).info())).message).toContain('icosphere');
+  const remote = await worker.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 });
+  await vesicle.default();
+  const own = vesicle.Mesh.icosphere({ center: [0, 0, 0], radius: 1, maxEdge: 1 });
+  expect(() => own.distanceTo(wrong(remote))).toThrow(/^other: is a Mesh in a worker; .* pass on its arrays/);
 });
 
 test('arguments that cannot be sent are refused by name', async () => {

@@ -718,9 +718,10 @@ impl Pyramid {
         self.parts.iter().product::<usize>() as f64
     }
 
-    /// Returns the warnings about results on this image.
-    pub(super) fn warnings(&self) -> Vec<Warning> {
-        self.elongated().into_iter().chain(self.flat()).collect()
+    /// Returns the warnings about results on this image with the parameters `params`.
+    pub(super) fn warnings(&self, params: &DeformableParams) -> Vec<Warning> {
+        let boundary = self.flat().or_else(|| self.beyond_range(params));
+        self.elongated().into_iter().chain(boundary).collect()
     }
 
     fn elongated(&self) -> Option<Warning> {
@@ -738,6 +739,20 @@ impl Pyramid {
     fn flat(&self) -> Option<Warning> {
         let text = "all voxels have the same intensity: the image shows no boundary, and a surface in it means nothing";
         self.is_flat.then(|| Warning::new(WarningCode::NoBoundary, text))
+    }
+
+    /// Warns of an iso value that no surface has. Of a sparse volume, the intensities are not known.
+    fn beyond_range(&self, &DeformableParams { iso, iso_force, .. }: &DeformableParams) -> Option<Warning> {
+        let [low, span] = self.volume_range;
+        let is_beyond = iso < low || iso > low + span;
+        let text = || {
+            let high = low + span;
+            format!(
+                "no surface has the iso value {iso}: the intensities of the volume are from {low} to {high}"
+            )
+        };
+        (is_beyond && iso_force != 0.0 && self.sparse.is_none())
+            .then(|| Warning::new(WarningCode::NoBoundary, text()))
     }
 
     /// Returns the map from model space to world space for a volume with the affine transform `affine`.

@@ -617,7 +617,7 @@ impl DeformableModel {
             euler: self.mesh.euler() as i32,
             events,
             times,
-            warnings: self.pyramid.warnings(),
+            warnings: self.pyramid.warnings(&self.params),
         }
     }
 
