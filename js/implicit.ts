@@ -20,6 +20,8 @@ import { checkedWarnings, ModelWarnings } from './warnings.js';
 export interface ImplicitInSlices {
   /** As {@link ImplicitSurface.toVolume}. */
   toVolume(dims: Vec3): Promise<Volume>;
+  /** As {@link ImplicitSurface.colorize}; rejects with `invalid-argument` if the surface has changed meanwhile. */
+  colorize(cameras: Camera[]): Promise<void>;
 }
 
 /**
@@ -139,6 +141,11 @@ export interface ImplicitOptions {
    * as all points, the normalised box is theirs.
    */
   keepComponents?: number;
+  /**
+   * Largest number of vertices of the surface, about; by default 350,000, or 24 for each point if these are more, which cells of
+   * the default size do not reach. Beyond it, steps throw `too-large`.
+   */
+  maxVertices?: number;
   /** Initial parameters: any subset; the others have their defaults. */
   params?: ImplicitParams;
   /** Findings of the points' reader, for the `warnings` of the mesh; kinds of its own have the code `reader`. */
@@ -189,7 +196,7 @@ interface Statistics {
 
 const OPTIONS = [
   ...['points', 'normals', 'confidence', 'colors', 'exterior', 'cameras'],
-  ...['maxPoints', 'keepComponents', 'params', 'warnings'],
+  ...['maxPoints', 'keepComponents', 'maxVertices', 'params', 'warnings'],
 ];
 
 /**
@@ -425,7 +432,7 @@ export class ImplicitSurface implements Stepper {
 
   /**
    * Returns long operations that yield to the event loop between slices of work and can be aborted. Results and errors are
-   * those of the methods of the same name, bit for bit; the surface may change meanwhile.
+   * those of the methods of the same name, bit for bit; while a volume is sampled, the surface may change.
    *
    * @param options - `signal`: aborts operations, which reject with `signal.reason`; `budgetMs`: duration of a slice of
    *   work, milliseconds, default 12.
@@ -444,6 +451,18 @@ export class ImplicitSurface implements Stepper {
         try {
           const raw = await runInSlices(() => work.use((one) => one.advance()), signal, budgetMs);
           return wrapVolume(() => withWarnings(raw, warnings));
+        } finally {
+          work.free();
+        }
+      },
+      colorize: async (cameras) => {
+        const given = checkedCameras(cameras);
+        signal?.throwIfAborted();
+        const begin = () => this.#handle.use((raw) => raw.colorizeInSlices(rawCameras(given)));
+        const work = new Handle('ImplicitSurface', begin);
+        const advance = () => work.use((one) => this.#handle.use((raw) => (one.advance(raw) ? {} : undefined)));
+        try {
+          await runInSlices(advance, signal, budgetMs);
         } finally {
           work.free();
         }
@@ -503,6 +522,7 @@ function checked(given: ImplicitOptions): ImplicitOptions {
   if (known.exterior !== undefined) pointArray('exterior', known.exterior);
   if (known.maxPoints !== undefined) integer('maxPoints', known.maxPoints);
   if (known.keepComponents !== undefined) integer('keepComponents', known.keepComponents, { min: 1 });
+  if (known.maxVertices !== undefined) integer('maxVertices', known.maxVertices, { min: 1 });
   const warnings = checkedWarnings('warnings', known.warnings);
   const [cameras, params] = [checkedCameras(known.cameras ?? []), shallowCopy('params', known.params ?? {})];
   return { ...known, cameras, params, warnings };
@@ -543,7 +563,8 @@ function rawCameras(cameras: readonly Camera[]): RawCameras {
 }
 
 function rawSurface(given: ImplicitOptions): RawImplicit {
-  const { points, normals, confidence, colors, exterior, cameras = [], maxPoints, keepComponents, params } = given;
+  const { points, normals, confidence, colors, exterior, cameras = [], ...rest } = given;
+  const { maxPoints, keepComponents, maxVertices, params } = rest;
   return new RawImplicit(
     points,
     normals,
@@ -553,6 +574,7 @@ function rawSurface(given: ImplicitOptions): RawImplicit {
     rawCameras(cameras),
     maxPoints,
     keepComponents,
+    maxVertices,
     params,
   );
 }

@@ -55,7 +55,7 @@ export const MOST_WRITTEN_OF_SMALL = 2 ** 28;
 /** The same, if they are compressed: repeated voxels are compressed fast, their intensities may not be. */
 export const MOST_COMPRESSED_OF_SMALL = 3 * 2 ** 23;
 
-/** Most voxels that an image of small files may be resampled to: more would take longer than a few seconds. */
+/** Most voxels that an image of small files may be resampled to, all levels together: more would take longer than a few seconds. */
 export const MOST_RESAMPLED_OF_SMALL = 50_000_000;
 
 /** Most vertices of a tracked surface in an image of small files, unless its maker allows more, for the same reason. */

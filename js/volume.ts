@@ -14,6 +14,7 @@ import {
   vec3,
 } from './check.js';
 import type { Bytes, LengthUnit, Space, Vec3, VolumeFileOptions, VolumeInit, VoxelArray } from './data.js';
+import { VesicleError } from './error.js';
 import { mark, notA } from './kind.js';
 import { Handle } from './runtime.js';
 // Entry points without sequences lack `RawFrames`, which an import by name would demand.
@@ -287,12 +288,14 @@ export class Volume {
    *
    * @param levels - Number of levels, this volume included.
    * @param options - `factor`: above 1, at most 2; default the square root of 3.
-   * @throws {@link VesicleError} `invalid-argument`: factor out of range, or more levels than the size allows.
+   * @throws {@link VesicleError} `invalid-argument`: factor out of range, or more levels than the size allows; `too-large`, also for
+   *   more than 50 million voxels in all but the first of an image from a file of at most 128 KiB.
    */
   pyramid(levels: number, options: { factor?: number } = {}): Volume[] {
     const { factor = Math.sqrt(3) } = checkProperties('options', options, ['factor']);
     integer('levels', levels, { min: 1 });
     number('factor', factor);
+    this.#checkLevels(levels, factor);
     const raw = this.#handle.use((raw) => raw.pyramid(levels, factor));
     return raw.map((level) =>
       notedLike(
@@ -300,6 +303,17 @@ export class Volume {
         wrap(() => level),
       ),
     );
+  }
+
+  /** Refuses a pyramid of an image of small files that would take long. */
+  #checkLevels(levels: number, factor: number): void {
+    if (!isOfSmall(this) || !(factor > 1)) return;
+    const share = factor ** -3;
+    const below = (share * (1 - share ** (levels - 1))) / (1 - share);
+    const voxels = Math.round(below * this.dims.reduce((count, n) => count * n, this.frames));
+    if (voxels <= MOST_RESAMPLED_OF_SMALL) return;
+    const most = `${MOST_RESAMPLED_OF_SMALL}, for images from files of up to 128 KiB`;
+    throw new VesicleError('too-large', `factor: ${voxels} voxels in all levels but the first are more than ${most}`);
   }
 
   /**

@@ -231,7 +231,7 @@ export const SLICED: {
     distanceTo: 'method',
   },
   Volume: { enrichSlices: 'method' },
-  ImplicitSurface: { toVolume: 'method' },
+  ImplicitSurface: { toVolume: 'method', colorize: 'method' },
 };
 
 /** Static methods that the page may call in the worker, by class. */

@@ -261,6 +261,7 @@ fn implicit_options(bytes: &mut Choices, size: f64) -> ImplicitOptions {
         cameras: (0..bytes.one_of(&[0, 0, 0, 1, 2])).filter_map(|_| camera(bytes)).collect(),
         max_points: bytes.one_of(&[20_000, 20_000, 4, 10]),
         keep_components: bytes.chance(4).then(|| 1 + bytes.below(3)),
+        max_vertices: None,
         params: implicit_params(bytes, size),
     }
 }

@@ -16,7 +16,7 @@ use super::volume::RawVolume;
 use vesicle::math::Vec3;
 use vesicle::methods::MethodError;
 use vesicle::methods::implicit::{
-    Camera, Choice, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits,
+    Camera, Choice, Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits, VertexColors,
 };
 use vesicle::pauses::{Computation, advance};
 use vesicle::volume::Volume;
@@ -67,8 +67,8 @@ method_bindings!(RawImplicit, ImplicitSurface, implicitParamSpecs);
 impl RawImplicit {
     /// Creates an implicit surface of points, with a normal, a confidence and a colour of each if given, and points
     /// known to be outside (`exterior`); the images of `cameras` colour it. At most `max_points` become surface
-    /// constraints; only the `keep_components` largest clusters of nearby points are used, all if it is not given.
-    /// Properties of `params` replace the defaults.
+    /// constraints; only the `keep_components` largest clusters of nearby points are used, all if it is not given. The surface
+    /// may have about `max_vertices`. Properties of `params` replace the defaults.
     #[wasm_bindgen(constructor)]
     #[expect(
         clippy::too_many_arguments,
@@ -83,6 +83,7 @@ impl RawImplicit {
         cameras: RawCameras,
         max_points: Option<usize>,
         keep_components: Option<usize>,
+        max_vertices: Option<usize>,
         params: &JsValue,
     ) -> Result<RawImplicit, JsValue> {
         let (positions, origin) = located(positions)?;
@@ -99,6 +100,7 @@ impl RawImplicit {
             cameras: cameras.0,
             max_points: max_points.unwrap_or(defaults.max_points),
             keep_components,
+            max_vertices,
             params: with_overrides(&ImplicitParams::default(), params)?,
         };
         Ok(RawImplicit(shared(ImplicitSurface::new(cloud, options))?))
@@ -191,6 +193,13 @@ impl RawImplicit {
         Ok(())
     }
 
+    /// Begins what `colorize` does, in slices of work; the surface must not change meanwhile.
+    #[wasm_bindgen(js_name = colorizeInSlices)]
+    pub fn colorize_in_slices(&self, cameras: RawCameras) -> Result<RawColoring, JsValue> {
+        let begun = self.0.borrow().begin_coloring(&cameras.0).map_err(Failure::from)?;
+        Ok(RawColoring(Box::pin(begun)))
+    }
+
     /// Returns further results: the edge of an extraction cell in world units, the mean spacing of the surface
     /// constraints in units of the normalised box, the numbers of duplicate points, outliers and spurious components, what
     /// was chosen from the points, and a warning about the parameters if there is one.
@@ -230,6 +239,21 @@ struct Statistics {
     choice: Option<Choice>,
     #[serde(skip_serializing_if = "Option::is_none")]
     warning: Option<&'static str>,
+}
+
+/// Colours of a surface that are being computed.
+#[wasm_bindgen]
+pub struct RawColoring(Computation<VertexColors>);
+
+#[wasm_bindgen]
+impl RawColoring {
+    /// Does a slice of the work; at the end, colours `surface`, with which it was begun, and returns true, after which this
+    /// must not be called any more.
+    pub fn advance(&mut self, surface: &RawImplicit) -> Result<bool, JsValue> {
+        let Poll::Ready(colors) = advance(&mut self.0) else { return Ok(false) };
+        surface.0.borrow_mut().take_colors(colors).map_err(Failure::from)?;
+        Ok(true)
+    }
 }
 
 /// A volume that is being sampled.

@@ -136,6 +136,7 @@ fn options(random: &mut Random, cloud: &Cloud) -> ImplicitOptions {
         },
         max_points: if random.below(3) == 0 { 4 + random.below(200) } else { 20_000 },
         keep_components: (random.below(4) == 0).then(|| 1 + random.below(3)),
+        max_vertices: None,
         params: params(random),
     }
 }

@@ -171,6 +171,36 @@ test('sampled as a volume it can be fitted by the deformable model', async () =>
   expect(model.mesh.info().volume / ((4 / 3) * Math.PI)).toBeGreaterThan(0.9);
 });
 
+test('a surface of more vertices than allowed is refused, and a larger cell is taken then', () => {
+  const refused = failure(() => finished({ params: { cell: 0.004, sides: 'outside' } }));
+  expect([refused.code, refused.message]).toEqual([
+    'too-large',
+    expect.stringMatching(/more than 350000 vertices: use a larger cell/),
+  ]);
+  const few = surface({ maxVertices: 500 });
+  expect(failure(() => few.step(1000)).message).toContain('more than 500 vertices');
+  few.setParams({ cell: 0.3 });
+  while (!few.step(100).done);
+  expect(few.mesh.vertexCount).toBeLessThan(500);
+});
+
+test('it is coloured in slices to the same bits, if it does not change meanwhile, and not if that is aborted', async () => {
+  const [whole, sliced, aborted, changed] = [finished(), finished(), finished(), finished()];
+  const cameras = Array.from({ length: 40 }, (_, k) => above([6 * k, 0, 0, 255]));
+  whole.colorize(cameras);
+  await sliced.inSlices({ budgetMs: 0.01 }).colorize(cameras);
+  expect(whole.mesh.arrays().colors).toBeDefined();
+  expect(sliced.mesh.arrays().colors).toEqual(whole.mesh.arrays().colors);
+  const stop = new AbortController();
+  const work = aborted.inSlices({ signal: stop.signal, budgetMs: 0.01 }).colorize(cameras);
+  stop.abort('enough');
+  await expect(work).rejects.toBe('enough');
+  expect(aborted.mesh.arrays().colors).toBeUndefined();
+  const late = changed.inSlices({ budgetMs: 0.01 }).colorize(cameras);
+  changed.colorize(cameras.slice(0, 1));
+  expect((await rejection(late)).message).toContain('the surface has changed meanwhile');
+});
+
 test('it is sampled in slices to the same bits, although it changes meanwhile, and not if that is aborted', async () => {
   const found = finished();
   const whole = found.toVolume([40, 41, 42]);

@@ -209,6 +209,18 @@ test('a small file with a slope is not written as many times its voxels', () => 
   small.free();
 });
 
+test('a pyramid of an image of a small file has fifty million voxels at most, in all levels but the first', () => {
+  const [small, large] = [nrrd('gzip'), nrrd('raw')].map((bytes) => Volume.parse(bytes)) as [Volume, Volume];
+  const factor = 1.0001;
+  const levels = Math.ceil(60_000_000 / SIZE ** 3);
+  expect(failure(() => small.pyramid(levels, { factor }))).toMatchObject({
+    code: 'too-large',
+    message: expect.stringMatching(/^factor: \d+ voxels in all levels but the first are more than 50000000/),
+  });
+  expect(small.pyramid(2).length).toBe(2);
+  expect(failure(() => large.pyramid(levels, { factor })).message).toMatch(/^levels/);
+});
+
 test('an image of a small file is resampled to fifty million voxels at most, any other to as many as there is memory for', () => {
   const [small, large] = [nrrd('gzip'), nrrd('raw')].map((bytes) => Volume.parse(bytes)) as [Volume, Volume];
   for (const grid of [{ dims: [369, 369, 369] }, { spacing: [0.28, 0.28, 0.28] }, { like: large }] as const) {

@@ -12,6 +12,7 @@ use super::camera::{Camera, ColorMean, Projected};
 use crate::math::order::sort_distinct;
 use crate::math::{DVec3, Groups, Vec3};
 use crate::mesh::TriangleMesh;
+use crate::pauses::Pauses;
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -34,15 +35,21 @@ const SILHOUETTE_WIDTH: f64 = 3.0;
 /// a better view.
 const SILHOUETTE_WEIGHT: f32 = 0.01;
 
+/// Number of vertices for which a camera counts as a unit of work.
+const VERTICES_PER_UNIT: usize = 60;
+
 /// Margin against rounding, in pixels, around the pixels that a triangle may cover in a depth buffer; without it,
 /// single pixels on edges are missed.
 const PIXEL_MARGIN: f64 = 1e-6;
 
 /// Returns the colour of each vertex, red, green and blue in 0..1, from all cameras that have an image; `None` if no
 /// camera sees any of it. See [`Coloring`] for the requirements on the surface.
-pub fn colors(surface: &TriangleMesh, cameras: &[Camera]) -> Option<Vec<Vec3>> {
-    let mut coloring = Coloring::new(surface.positions.len());
-    cameras.iter().for_each(|camera| coloring.add(surface, camera));
+pub async fn colors(surface: &TriangleMesh, cameras: &[Camera]) -> Option<Vec<Vec3>> {
+    let (mut coloring, pauses) = (Coloring::new(surface.positions.len()), Pauses::default());
+    for camera in cameras {
+        coloring.add(surface, camera);
+        pauses.after(1 + surface.positions.len() / VERTICES_PER_UNIT).await;
+    }
     coloring.finish(surface)
 }
 
@@ -317,6 +324,7 @@ fn nearness_limits(corners: [DVec3; 3]) -> Range<f64> {
 mod tests {
     use super::*;
     use crate::mesh::Mesh;
+    use crate::pauses::finished;
     #[cfg(target_arch = "wasm32")]
     use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -403,14 +411,18 @@ mod tests {
         surface.positions.iter().zip(colors).map(off).fold(0.0, f32::max)
     }
 
+    fn finished_colors(surface: &TriangleMesh, cameras: &[Camera]) -> Option<Vec<Vec3>> {
+        finished(colors(surface, cameras))
+    }
+
     #[test]
     fn a_painted_ball_comes_back() {
         let ball = UNIT.mesh(0.06);
         let cameras = six_sides(|_| [200, 200]);
-        let found = worst(&ball, &colors(&ball, &cameras).unwrap());
+        let found = worst(&ball, &finished_colors(&ball, &cameras).unwrap());
         assert!(found < 0.01, "{found}");
         let bare = TriangleMesh { normals: None, ..ball };
-        let found = worst(&bare, &colors(&bare, &cameras).unwrap());
+        let found = worst(&bare, &finished_colors(&bare, &cameras).unwrap());
         assert!(found < 0.01, "{found} without normals");
     }
 
@@ -418,7 +430,7 @@ mod tests {
     fn background_behind_a_surface_too_large_hardly_counts() {
         for (radius, size) in [(1.005, 50), (1.01, 50), (1.01, 100), (1.02, 100), (1.01, 200)] {
             let ball = Ball { radius, ..UNIT }.mesh(0.06);
-            let found = worst(&ball, &colors(&ball, &six_sides(|_| [size; 2])).unwrap());
+            let found = worst(&ball, &finished_colors(&ball, &six_sides(|_| [size; 2])).unwrap());
             assert!(found < 0.02, "{found} with radius {radius} and {size} pixels");
         }
     }
@@ -427,7 +439,7 @@ mod tests {
     fn pictures_of_any_size() {
         let ball = UNIT.mesh(0.06);
         let sizes = [[300, 200], [64, 48], [3000, 90], [80, 2500], [200, 100], [101, 103]];
-        let found = worst(&ball, &colors(&ball, &six_sides(|i| sizes[i])).unwrap());
+        let found = worst(&ball, &finished_colors(&ball, &six_sides(|i| sizes[i])).unwrap());
         assert!(found < 0.02, "{found}");
     }
 
@@ -438,7 +450,7 @@ mod tests {
             let small = Ball { centre: DVec3::Z * (1.25 + gap), radius: 0.25, paint: |_| RED };
             let surface = joined([big.mesh(0.05), small.mesh(0.03)]);
             let camera = camera(&[&big, &small], DVec3::Z * 5.0, DVec3::ZERO, [size; 2], BLACK);
-            let colors = colors(&surface, &[camera]).unwrap();
+            let colors = finished_colors(&surface, &[camera]).unwrap();
             let split = big.mesh(0.05).positions.len();
             for (p, color) in surface.positions.iter().zip(&colors).take(split) {
                 assert!(color.x < 0.01, "gap {gap}, {size} pixels: {p} is {color}");
@@ -495,7 +507,7 @@ mod tests {
         let surface = joined([halves.mesh(0.1), aside.mesh(0.3)]);
         let camera = camera(&[&halves], DVec3::Z * 5.0, DVec3::ZERO, [300; 2], BLACK);
         let seen = weights(&surface, &camera);
-        let colors = colors(&surface, &[camera]).unwrap();
+        let colors = finished_colors(&surface, &[camera]).unwrap();
         let split = halves.mesh(0.1).positions.len();
         for (p, color) in surface.positions.iter().zip(&colors).take(split).filter(|(p, _)| p.x.abs() > 0.5) {
             let expected = if p.x < 0.0 { Vec3::X } else { Vec3::Z };
@@ -514,7 +526,12 @@ mod tests {
         for (p, weight) in surface.positions.iter().zip(weights(&surface, &camera)) {
             assert!(p.x > -0.02 || weight == 0.0, "{p}");
         }
-        assert!(colors(&surface, &[camera]).unwrap().iter().all(|color| (*color - Vec3::Z).length() < 1e-6));
+        assert!(
+            finished_colors(&surface, &[camera])
+                .unwrap()
+                .iter()
+                .all(|color| (*color - Vec3::Z).length() < 1e-6)
+        );
     }
 
     #[test]
@@ -524,9 +541,9 @@ mod tests {
         let away = camera(&[&UNIT], DVec3::X * 4.0, DVec3::X * 9.0, [20, 20], TEAL);
         let blank = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 9.0];
         let blank = Camera::new(blank, 20, 20, None).unwrap();
-        assert_eq!(colors(&ball, &[]), None);
-        assert_eq!(colors(&ball, &[blank, away]), None);
-        assert_eq!(colors(&TriangleMesh::default(), std::slice::from_ref(front)), None);
+        assert_eq!(finished_colors(&ball, &[]), None);
+        assert_eq!(finished_colors(&ball, &[blank, away]), None);
+        assert_eq!(finished_colors(&TriangleMesh::default(), std::slice::from_ref(front)), None);
     }
 
     #[test]
@@ -538,7 +555,7 @@ mod tests {
         let mut resumed = coloring.clone();
         cameras[2..].iter().for_each(|camera| resumed.add(&ball, camera));
         let found = resumed.finish(&ball);
-        assert_eq!(found, colors(&ball, &cameras));
-        assert_eq!(found, colors(&ball, &cameras));
+        assert_eq!(found, finished_colors(&ball, &cameras));
+        assert_eq!(found, finished_colors(&ball, &cameras));
     }
 }

@@ -43,6 +43,8 @@ pub struct Extraction {
     extractor: SurfaceExtractor,
     /// Length of the gradient at each vertex, as far as it is computed.
     slopes: Vec<f32>,
+    /// Largest number of cells that the surface may cross.
+    most_cells: usize,
     stage: Stage,
 }
 
@@ -57,6 +59,13 @@ enum Stage {
 /// on twenty shapes with noise of 0 and .01 it is .1 or less only at the links of a thin chain and on a star with wrong
 /// blades. Where points are missing it is .2 and more.
 const UNCLEAR: f32 = 0.1;
+
+fn too_large(most: usize) -> MethodError {
+    let problem = format!(
+        "the surface would have more than {most} vertices: use a larger cell, or allow more with maxVertices"
+    );
+    MethodError::TooLarge { problem }
+}
 
 /// Returns the default edge length of an extraction cell, in world units, for points whose mean distance to the nearest
 /// neighbour is `spacing`, in units of the normalised box. Far from the origin it is larger, as single precision is
@@ -75,7 +84,7 @@ const MAX_DISTANCE_IN_EDGES: f64 = 8100.0;
 impl Extraction {
     /// Starts extracting the surface on which `field`, in the normalised box of `map`, equals `level`, from the cells
     /// around `points` and, if it `scans`, those that a coarse scan of the lattice finds; `points` and the edge length of a
-    /// cell, `cell`, are in world units.
+    /// cell, `cell`, are in world units. The surface may cross `most_cells`; it has about as many vertices.
     ///
     /// # Errors
     /// [`MethodError::InvalidArgument`] if the cell is too small or too large for the points; [`MethodError::Volume`]
@@ -87,6 +96,7 @@ impl Extraction {
         points: &[Vec3],
         cell: f64,
         scans: bool,
+        most_cells: usize,
     ) -> Result<Self, MethodError> {
         let bounds = Bounds::from_points(points);
         let margin = DVec3::splat(MARGIN * 2.0 / map.scale());
@@ -115,14 +125,14 @@ impl Extraction {
         extractor.refine(STEPS);
         let field = FastField::new(field.clone(), map.in_box_exactly(low), map.in_box_exactly(high));
         let (points, slopes) = (points.to_vec(), Vec::new());
-        Ok(Self { field, map, level, points, extractor, slopes, stage: Stage::Extract })
+        Ok(Self { field, map, level, points, extractor, slopes, most_cells, stage: Stage::Extract })
     }
 
     /// Does a slice of the extraction, about ten milliseconds of work. Returns the surface, in world units, with its
     /// outward normals once it is finished, `None` before.
     ///
     /// # Errors
-    /// [`MethodError::Volume`] if memory cannot be allocated.
+    /// [`MethodError::Volume`] if memory cannot be allocated; [`MethodError::TooLarge`].
     pub fn advance(&mut self) -> Result<Option<TriangleMesh>, MethodError> {
         match &mut self.stage {
             Stage::Extract => {
@@ -134,6 +144,9 @@ impl Extraction {
                     field.values(&in_box, values);
                     values.iter_mut().for_each(|value| *value -= level);
                 })?;
+                if self.extractor.crossed_cells() > self.most_cells {
+                    return Err(too_large(self.most_cells));
+                }
                 if done {
                     self.stage = Stage::Normals(self.extractor.mesh()?, Vec::new());
                 }

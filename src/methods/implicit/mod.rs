@@ -60,6 +60,7 @@ pub use cloud::Cloud;
 pub use edits::PointEdits;
 pub use measure::Fitness;
 pub use params::{ImplicitParams, IsoValue, KernelKind, Sides};
+pub use queries::VertexColors;
 
 use super::method::method;
 use super::params::Auto;
@@ -100,6 +101,8 @@ pub struct ImplicitOptions {
     /// Number of clusters of nearby points to keep, largest first, which discards outliers; `None` keeps all clusters. The
     /// normalised box is that of all points, or if the clusters are less than half as long, theirs.
     pub keep_components: Option<usize>,
+    /// Largest number of vertices of the surface, about; by default 350,000, or 24 for each point.
+    pub max_vertices: Option<usize>,
     /// Initial parameters of kernel, regularisation, solver and extraction.
     pub params: ImplicitParams,
 }
@@ -111,11 +114,16 @@ impl Default for ImplicitOptions {
             cameras: Vec::new(),
             max_points: DEFAULT_POINTS,
             keep_components: None,
+            max_vertices: None,
             params: ImplicitParams::default(),
         }
     }
 }
 
+/// Default value of [`ImplicitOptions::max_vertices`]: as many in all, or for each point if these are more; cells of the default
+/// size give less.
+const LEAST_MOST: usize = 350_000;
+const MOST_OF_POINT: usize = 24;
 /// Default value of [`ImplicitOptions::max_points`].
 const DEFAULT_POINTS: usize = 20_000;
 /// Maximum size, in bytes, of the linear system's matrix that is kept after a solve, so that edits of the points need
@@ -683,8 +691,13 @@ impl ImplicitSurface {
             &points,
             self.cell(),
             self.sides == Some(Sides::Outside),
+            self.most_vertices(),
         )?;
         Ok(Stage::Extract(Box::new(extraction)))
+    }
+
+    fn most_vertices(&self) -> usize {
+        self.options.max_vertices.unwrap_or_else(|| LEAST_MOST.max(MOST_OF_POINT * self.original.len()))
     }
 
     /// Returns the iso-value of the implicit function f, chosen by the parameter `level`, at which the surface is

@@ -133,6 +133,18 @@ impl ImplicitSurface {
     /// # Errors
     /// [`MethodError::InvalidArgument`] if there is no surface yet, or no camera has an image.
     pub fn colorize(&mut self, cameras: &[Camera]) -> Result<(), MethodError> {
+        let coloring = finished(self.begin_coloring(cameras)?);
+        self.take_colors(coloring)
+    }
+
+    /// Begins to compute colours for [`Self::take_colors`] as [`Self::colorize`] does, in [slices](crate::pauses).
+    ///
+    /// # Errors
+    /// As [`Self::colorize`].
+    pub fn begin_coloring(
+        &self,
+        cameras: &[Camera],
+    ) -> Result<impl Future<Output = VertexColors> + use<>, MethodError> {
         if self.mesh.triangles.is_empty() {
             return Err(MethodError::invalid(
                 "colorize",
@@ -142,13 +154,33 @@ impl ImplicitSurface {
         if !cameras.iter().any(Camera::has_image) {
             return Err(MethodError::invalid("cameras", "at least one must have an image"));
         }
+        let (mesh, version) = (self.mesh.clone(), self.version);
         let cameras = cameras_at(self.origin, cameras.to_vec());
-        if let Some(colors) = color::colors(&self.mesh, &cameras) {
+        Ok(async move { VertexColors { colors: color::colors(&mesh, &cameras).await, version } })
+    }
+
+    /// Takes the colours of [`Self::begin_coloring`].
+    ///
+    /// # Errors
+    /// [`MethodError::InvalidArgument`] if the surface has changed meanwhile.
+    pub fn take_colors(&mut self, found: VertexColors) -> Result<(), MethodError> {
+        if found.version != self.version {
+            return Err(MethodError::invalid("colorize", "the surface has changed meanwhile"));
+        }
+        if let Some(colors) = found.colors {
             self.mesh.colors = Some(colors);
             self.version = self.version.wrapping_add(1);
         }
         Ok(())
     }
+}
+
+/// Colours of the vertices of an implicit surface.
+pub struct VertexColors {
+    /// `None` if no camera sees any vertex.
+    colors: Option<Vec<Vec3>>,
+    /// The version of the surface.
+    version: u32,
 }
 
 /// Margin around points and surface in [`ImplicitSurface::to_volume`], as a share of the longest side of the points'

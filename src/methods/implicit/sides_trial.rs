@@ -123,7 +123,7 @@ impl Attempt {
         let solved = Solved::new(solver.kernel(), constraints.centres.clone(), solver.solution()?, 0.0);
         let points = map.all_in_world(&samples.cloud.points);
         let cell = COARSER * default_cell(map, samples.spacing);
-        let extraction = Extraction::new(&solved.field, *map, 0.0, &points, cell, false).ok()?;
+        let extraction = Extraction::new(&solved.field, *map, 0.0, &points, cell, false, usize::MAX).ok()?;
         Some(Self::Extract(Box::new(extraction)))
     }
 
