@@ -75,9 +75,10 @@ test('adapters import neither hosts nor the module', async () => {
     const imports = [...code.matchAll(/^(?:import|export) [^;]*?from '(.*)';$/gm)].map(([, from = '']) => from);
     expect(code.match(/^import|import\(/gm)?.length ?? 0, file).toBeLessThanOrEqual(imports.length);
     for (const from of imports)
-      expect(['../check.js', '../error.js', '../warnings.js', ...files.map((name) => `./${name}`)], file).toContain(
-        from,
-      );
+      expect(
+        ['../check.js', '../error.js', '../kind.js', '../warnings.js', ...files.map((name) => `./${name}`)],
+        file,
+      ).toContain(from);
   }
 });
 

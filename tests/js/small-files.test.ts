@@ -218,7 +218,7 @@ test('a pyramid of an image of a small file has fifty million voxels at most, in
     message: expect.stringMatching(/^factor: \d+ voxels in all levels but the first are more than 50000000/),
   });
   expect(small.pyramid(2).length).toBe(2);
-  expect(failure(() => large.pyramid(levels, { factor })).message).toMatch(/^levels/);
+  expect(large.pyramid(levels, { factor }).length).toBe(levels);
 });
 
 test('an image of a small file is resampled to fifty million voxels at most, any other to as many as there is memory for', () => {
