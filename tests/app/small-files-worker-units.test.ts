@@ -1,8 +1,9 @@
 // The worker of the Extract lab sends no more voxels than the page needs, and says how a run has failed.
 import { afterEach, expect, test, vi } from 'vitest';
 import { DeformableModel, VesicleError, Volume } from '../../pkg/index.js';
-import type { Requests, Setup, VolumeSource, WorkerEvent } from '../../www/src/engine/protocol';
+import type { VolumeSource } from '../../www/src/engine/protocol';
 import { levelsOf } from '../../www/src/engine/volumes';
+import type { Requests, Setup, WorkerEvent } from '../../www/src/labs/extract/protocol';
 import { paintSlice } from '../../www/src/scene/slicing';
 import { ball } from './volumes';
 import { startWorker } from './worker-in-node';

@@ -1,5 +1,6 @@
 import { Channel } from '../../engine/channel';
-import type { Requests, ReturnMessage, SurfaceBuffers, WorkerEvent } from '../../engine/protocol';
+import type { SurfaceBuffers } from '../../engine/protocol';
+import type { Requests, ReturnMessage, WorkerEvent } from './protocol';
 
 export { RequestError, toFailure } from '../../engine/channel';
 

@@ -2,8 +2,9 @@
 import type { Volume } from 'vesicle';
 import { bytesOf, callsOf, chosen, type Program, volumeOf } from '../../engine/code';
 import { literal } from '../../engine/literal';
-import type { LargeSource, Setup } from '../../engine/protocol';
+
 import { startOf } from './models';
+import type { LargeSource, Setup } from './protocol';
 
 /**
  * Volume of a run: a frame of files, of which a computed volume has none, or an image larger than memory and the number

@@ -3,8 +3,9 @@
  * (section 5.2 of Lachaud and Montanvert's paper).
  */
 import type { StepReport, Volume } from 'vesicle';
-import type { ComparisonProgressEvent, ExtractionRun, Requests, Setup } from '../../engine/protocol';
+
 import { buildModel } from './models';
+import type { ComparisonProgressEvent, ExtractionRun, Requests, Setup } from './protocol';
 
 /**
  * Largest number of iterations of each of the two compared runs; one that has not converged by then is compared in its

@@ -1,4 +1,4 @@
-import type { VertexQuantity, WorkerEvent } from '../../engine/protocol';
+import type { VertexQuantity } from '../../engine/protocol';
 import { History } from '../../kit/history';
 import type { LabState } from '../../kit/state';
 import type { ViewOptions } from '../../kit/view-options';
@@ -11,6 +11,7 @@ import type { Example } from './examples';
 import { linkOf, MOST_ATTRACTORS, toHash } from './link';
 import { ExtractOpening, type ExtractSource, frameOf } from './opening';
 import { ExtractParts, type PartEvents } from './parts';
+import type { WorkerEvent } from './protocol';
 import { ExtractResults } from './results';
 import { ExtractSettings } from './settings';
 

@@ -4,12 +4,13 @@
  */
 import init, { DeformableModel, type Volume } from 'vesicle/index';
 import { openZarr, type ZarrVolume } from 'vesicle/zarr';
-import type { LargeSource, Setup, VolumeView } from '../../engine/protocol';
+import type { VolumeView } from '../../engine/protocol';
 import { Refusal } from '../../engine/refusal';
 import { areSmall, CACHE_OF_SMALL } from '../../engine/small-files';
 import { viewOf } from '../../engine/volumes';
 import { text } from '../../texts';
 import { modelOptions, withAttractors } from './models';
+import type { LargeSource, Setup } from './protocol';
 
 /** An OME-Zarr image, and its coarsest level as a volume, which the page displays. */
 export class LargeVolume {

@@ -3,10 +3,11 @@
  * coloured.
  */
 import { DeformableModel, type Volume } from 'vesicle';
-import type { SavedRun, Setup, VertexQuantity } from '../../engine/protocol';
+import type { VertexQuantity } from '../../engine/protocol';
 import { EXTRACT_OF_SMALL } from '../../engine/small-files';
 import { otsu } from '../../engine/threshold';
 import { HISTOGRAM_BINS } from '../../engine/volumes';
+import type { SavedRun, Setup } from './protocol';
 
 type Options = ConstructorParameters<typeof DeformableModel>[0];
 

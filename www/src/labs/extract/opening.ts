@@ -1,12 +1,4 @@
-import type {
-  ImageSource,
-  LargeSource,
-  Loaded,
-  NamedBytes,
-  ParamSpec,
-  ParamValues,
-  Setup,
-} from '../../engine/protocol';
+import type { NamedBytes, ParamSpec, ParamValues } from '../../engine/protocol';
 import { isOfSmall } from '../../engine/small-files';
 import { nameOf, reading } from '../../importers/files';
 
@@ -26,6 +18,7 @@ import { fromHash, type Linked, withLink } from './link';
 import { type StartChoice, USUAL_START } from './panels/start';
 import type { ExtractParts } from './parts';
 import { defaultStart, exampleById } from './presets';
+import type { ImageSource, LargeSource, Loaded, Setup } from './protocol';
 import type { ExtractResults } from './results';
 import type { ExtractMoments, ExtractSettings } from './settings';
 

@@ -1,4 +1,4 @@
-import type { Attractor, LargeSource, ParamValues, Plane, VolumeView } from '../../engine/protocol';
+import type { Attractor, ParamValues, Plane, VolumeView } from '../../engine/protocol';
 import { fileChooser } from '../../importers/files';
 import { folded, h, section, wideButton } from '../../kit/dom';
 import { FigurePanel } from '../../kit/figure';
@@ -27,6 +27,7 @@ import { PyramidPanel } from './panels/pyramid';
 import { StartControls } from './panels/start';
 import { TimeTable } from './panels/times';
 import { isPreset, type Preset, type Variant, variantInForce } from './presets';
+import type { LargeSource } from './protocol';
 
 const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, color: 'plain', slices: 'walls' };
 

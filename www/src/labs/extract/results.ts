@@ -1,11 +1,4 @@
-import type {
-  ProgressEvent,
-  SectionsEvent,
-  SnapshotEvent,
-  StepReport,
-  SurfaceBuffers,
-  VolumeView,
-} from '../../engine/protocol';
+import type { StepReport, SurfaceBuffers, VolumeView } from '../../engine/protocol';
 import { count } from '../../kit/format';
 import { type History, type HistoryMark, underWay } from '../../kit/history';
 import type { LabState } from '../../kit/state';
@@ -13,6 +6,7 @@ import type { LabStates } from '../../lab/states';
 import { plural, text } from '../../texts';
 import type { Client } from './client';
 import type { ExtractParts } from './parts';
+import type { ProgressEvent, SectionsEvent, SnapshotEvent } from './protocol';
 
 export type ResultEvent = SnapshotEvent | ProgressEvent | SectionsEvent;
 

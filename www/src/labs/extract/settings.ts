@@ -1,4 +1,4 @@
-import type { Attractor, ParamValues, SavedRun, Setup, StartShape, VolumeView } from '../../engine/protocol';
+import type { Attractor, ParamValues, VolumeView } from '../../engine/protocol';
 import type { HistoryMark } from '../../kit/history';
 import type { Moments } from '../../lab/session/moments';
 import type { LabStates } from '../../lab/states';
@@ -8,6 +8,7 @@ import { type Client, toFailure } from './client';
 import type { StartChoice } from './panels/start';
 import type { ExtractParts } from './parts';
 import type { Preset, Variant } from './presets';
+import type { SavedRun, Setup, StartShape } from './protocol';
 import type { ExtractResults } from './results';
 
 /**

@@ -7,26 +7,16 @@ import { release } from '../../engine/memory';
 import type {
   Attractor,
   CodeRequest,
-  DataEvent,
   ExportRequest,
   Failure,
-  LargeSource,
   LevelView,
-  Loaded,
-  MeasuredCoverage,
   Measures,
   ParamValues,
   Plane,
-  Ready,
-  Requests,
-  ReturnMessage,
   RunCode,
-  SavedRun,
-  Setup,
   SurfaceBuffers,
   VertexQuantity,
   VolumeView,
-  WorkerEvent,
 } from '../../engine/protocol';
 import { Refusal, toFailure } from '../../engine/refusal';
 import { logged, RunRecorder } from '../../engine/run-log';
@@ -38,6 +28,18 @@ import { programOf, type RunData } from './code';
 import { compare } from './compare';
 import type { LargeVolume } from './large';
 import { buildModel, fittingSetup, restoredModel, valuesFor } from './models';
+import type {
+  DataEvent,
+  LargeSource,
+  Loaded,
+  MeasuredCoverage,
+  Ready,
+  Requests,
+  ReturnMessage,
+  SavedRun,
+  Setup,
+  WorkerEvent,
+} from './protocol';
 
 /**
  * Number of sets of surface buffers that go back and forth between worker and page: one on the screen, one in transit

@@ -1,6 +1,6 @@
 /** Sessions of the Extract lab. */
 import { literal, object, optional, picklist, undefined_, variant } from 'valibot';
-import type { StartShape } from '../../../engine/protocol';
+
 import type { ColorMode } from '../../../kit/view-options';
 import { MOST_ATTRACTORS } from '../../attractors';
 import { call, camera, history, log, placement, reports, session, steps, undoable } from './parts';
@@ -22,7 +22,7 @@ const calls = variant('call', [
   call('setAttractors', attractors),
   call('seed', maybe(undefined_())),
 ]);
-const kind = oneOf<StartShape['kind']>({
+const kind = oneOf({
   contour: true,
   enclosing: true,
   bubbles: true,

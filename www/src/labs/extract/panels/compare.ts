@@ -1,8 +1,8 @@
-import type { ComparisonProgressEvent, ExtractionRun, Requests } from '../../../engine/protocol';
 import { h } from '../../../kit/dom';
 import { count, figure, levelSymbol } from '../../../kit/format';
 import { TaskControls } from '../../../kit/task';
 import { text } from '../../../texts';
+import type { ComparisonProgressEvent, ExtractionRun, Requests } from '../protocol';
 import { addTimes, seconds, TIME_NOTE, TIME_ROWS, timeOf } from './times';
 
 type Result = NonNullable<Requests['compare']['reply']>;

@@ -1,8 +1,9 @@
-import type { CoverageProgressEvent, MeasuredCoverage, UncoveredRegion, Vec3 } from '../../../engine/protocol';
+import type { UncoveredRegion, Vec3 } from '../../../engine/protocol';
 import { h } from '../../../kit/dom';
 import { count, lengths, place } from '../../../kit/format';
 import { TaskControls } from '../../../kit/task';
 import { plural, text } from '../../../texts';
+import type { CoverageProgressEvent, MeasuredCoverage } from '../protocol';
 
 /**
  * Largest number of uncovered regions listed in the panel and marked in the views; the sentence above the list counts

@@ -1,7 +1,7 @@
-import type { LargeSource } from '../../../engine/protocol';
 import { h, uniqueId } from '../../../kit/dom';
 import { bytes } from '../../../kit/format';
 import { text } from '../../../texts';
+import type { LargeSource } from '../protocol';
 
 /** Names of this computer that the policy of the worker permits; a policy cannot name an IPv6 address. */
 const LOOPBACK = ['localhost', '127.0.0.1'];

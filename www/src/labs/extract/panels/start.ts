@@ -1,7 +1,7 @@
-import type { StartShape } from '../../../engine/protocol';
 import { h } from '../../../kit/dom';
 import { Field, type FormControl, selectFrom } from '../../../kit/field';
 import { text } from '../../../texts';
+import type { StartShape } from '../protocol';
 
 type Kind = StartShape['kind'];
 
