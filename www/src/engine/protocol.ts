@@ -1,4 +1,4 @@
-/** What the messages between the page and the workers of all labs have in common. */
+/** Messages between the page and the workers, as far as all labs have them in common. */
 import type {
   Attractor,
   Coverage,
