@@ -47,3 +47,18 @@ test.each([40, 260])('labels of a map of %i³ voxels are counted when they are p
   expect(await paint([18, 10, 10], 0)).toMatchObject({ 2: 988 });
   expect(slice.mock.calls.length > 0).toBe(n > 256);
 });
+
+test('a label map in a small file has at most 400 labels', async () => {
+  const file = (labels: number) => {
+    const data = Buffer.alloc(2 * 16 ** 3);
+    for (let label = 1; label <= labels; label++) data.writeUInt16LE(label, 2 * label);
+    const head = 'NRRD0004\ntype: uint16\ndimension: 3\nsizes: 16 16 16\nendian: little\nencoding: raw\n\n';
+    return { name: 'labels.nrrd', bytes: new Uint8Array(Buffer.concat([Buffer.from(head), data])) };
+  };
+  await worker.request('open', { name: 'image', source: { files: [file(1)] }, params: {}, labels: undefined });
+  const opened = await worker.request('openLabels', { files: [file(400)] });
+  expect(opened.surfaces).toHaveLength(400);
+  await expect(worker.request('openLabels', { files: [file(401)] })).rejects.toThrow(
+    '401 labels; from files of at most 128 KiB, the app shows at most 400',
+  );
+});

@@ -20,6 +20,15 @@ export const EXTRACT_OF_SMALL = { maxVertices: 300_000 };
 export const SEGMENT_OF_SMALL = { maxVertices: 200_000 };
 export const TRACK_OF_SMALL = { maxVertices: 200_000, maxVoxels: 8_000_000 };
 
+/** Most labels of a label map in small files: each has a row in two lists of the page, and a surface. */
+export const MOST_LABELS_OF_SMALL = 400;
+
+/** Returns a text that refuses a label map of small files with more labels than that; undefined for others. */
+export function tooManyLabels(labels: number): string | undefined {
+  if (labels <= MOST_LABELS_OF_SMALL) return undefined;
+  return text('segment.tooManyOfSmall', { labels, most: MOST_LABELS_OF_SMALL, kilobytes: SMALL / 2 ** 10 });
+}
+
 /** Returns whether data are in small files, or in a small session, which has them. */
 /** A session, as far as it says how large its data are. */
 interface Sized {

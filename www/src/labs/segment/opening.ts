@@ -1,4 +1,5 @@
 import type { LabelArray } from '../../engine/labels';
+import { tooManyLabels } from '../../engine/small-files';
 import { nameOf, reading } from '../../importers/files';
 import { dataUrl, fetchBytes } from '../../lab/downloads';
 import type { Handoff } from '../../lab/lab';
@@ -76,8 +77,10 @@ export class SegmentOpening extends Opening<SegmentExample, LinkedSegment, Image
   protected async load(origin: SegmentSource, source: ImageSource, reopening: boolean): Promise<OpenedImage> {
     const { name, linked, session } = origin;
     if (session && !reopening) {
-      const { params, voxels: labels, state } = contentOf(session, 'segment');
+      const { params, voxels: labels, state, labels: list } = contentOf(session, 'segment');
       const isSmall = session.isSmall === true;
+      const refusal = isSmall && tooManyLabels(list.length);
+      if (refusal) throw new Error(refusal);
       return this.#client.request('open', { name, source, params, labels, state, isSmall });
     }
     const labels = reopening ? this.#lab.labels() : undefined;

@@ -6,7 +6,7 @@ import { quantize } from '../../engine/quantize';
 import { Refusal } from '../../engine/refusal';
 import { type Handlers, serve, withTransfer } from '../../engine/serving';
 import { withLabels } from '../../engine/slicer';
-import { areSmall, SEGMENT_OF_SMALL } from '../../engine/small-files';
+import { areSmall, SEGMENT_OF_SMALL, tooManyLabels } from '../../engine/small-files';
 import { capacityFor } from '../../engine/surface-buffers';
 import { triangleArea } from '../../engine/triangle-area';
 import { displayOf, fitsNifti, viewOf } from '../../engine/volumes';
@@ -57,6 +57,8 @@ class LiveMap {
     this.map = mapLike(image, voxels, warnings);
     this.#voxelVolume = Math.abs(determinant(image.volume.affine));
     try {
+      const refusal = isSmall && tooManyLabels(this.map.labels().length);
+      if (refusal) throw new Refusal('too-large', refusal);
       this.surfaces = new LabelSurfaces({ volume: this.map, ...params, ...(isSmall && SEGMENT_OF_SMALL) });
       if (state) this.surfaces.restore(state);
     } catch (error) {
