@@ -22,6 +22,7 @@ import {
   checkedSlices,
   checkListener,
   checkSignal,
+  finishInSlices,
   type RunOptions,
   runInSlices,
   SlicedRunner,
@@ -262,8 +263,8 @@ export class DeformableModel implements Stepper {
    * @throws As the constructor; `signal.reason` when aborted.
    */
   static async create(given: DeformableOptions, options?: SliceOptions): Promise<DeformableModel> {
-    const { signal, budgetMs } = checkedSlices(options);
-    signal?.throwIfAborted();
+    const slices = checkedSlices(options);
+    slices.signal?.throwIfAborted();
     const checkedOptions = checked(given);
     const source = sparseSource(checkedOptions.volume);
     const sparse = source && { source, volume: source.create() };
@@ -272,18 +273,14 @@ export class DeformableModel implements Stepper {
       sparse
         ? onSparse(sparse, checkedOptions, (...of) => RawDeformableCreation.newSparse(...of))()
         : dense(volume as Handle<RawVolume>, checkedOptions, (...of) => new RawDeformableCreation(...of))();
-    let creation: Handle<RawDeformableCreation> | undefined;
     try {
-      creation = new Handle('DeformableModel', begin);
-      const begun = creation;
-      const raw = await runInSlices(() => begun.use((one) => one.advance()), signal, budgetMs);
+      const creation = new Handle('DeformableModel', begin);
+      const raw = await finishInSlices(creation, (one) => one.advance(), slices);
       const handle = new Handle('DeformableModel', () => raw);
       return new DeformableModel(new Created(checkedOptions, volume, handle, sparse) as unknown as DeformableOptions);
     } catch (error) {
       sparse?.volume.free();
       throw error;
-    } finally {
-      creation?.free();
     }
   }
 

@@ -4,9 +4,9 @@ import { type Mesh, wrapMesh } from './mesh.js';
 import { Handle } from './runtime.js';
 import {
   checkedSlices,
+  finishInSlices,
   Runner,
   type RunOptions,
-  runInSlices,
   type SliceOptions,
   type Stepper,
   type StepReport,
@@ -439,33 +439,24 @@ export class ImplicitSurface implements Stepper {
    * @throws {@link VesicleError} `invalid-argument`.
    */
   inSlices(options?: SliceOptions): ImplicitInSlices {
-    const { signal, budgetMs } = checkedSlices(options);
+    const slices = checkedSlices(options);
     // Throws if the surface was freed.
     this.#handle.use(() => undefined);
     return {
       toVolume: async (dims) => {
         const sizes = gridSizes(dims);
-        signal?.throwIfAborted();
+        slices.signal?.throwIfAborted();
         const warnings = this.#warnings.of();
         const work = new Handle('ImplicitSurface', () => this.#handle.use((raw) => raw.toVolumeInSlices(sizes)));
-        try {
-          const raw = await runInSlices(() => work.use((one) => one.advance()), signal, budgetMs);
-          return wrapVolume(() => withWarnings(raw, warnings));
-        } finally {
-          work.free();
-        }
+        const raw = await finishInSlices(work, (one) => one.advance(), slices);
+        return wrapVolume(() => withWarnings(raw, warnings));
       },
       colorize: async (cameras) => {
         const given = checkedCameras(cameras);
-        signal?.throwIfAborted();
+        slices.signal?.throwIfAborted();
         const begin = () => this.#handle.use((raw) => raw.colorizeInSlices(rawCameras(given)));
         const work = new Handle('ImplicitSurface', begin);
-        const advance = () => work.use((one) => this.#handle.use((raw) => (one.advance(raw) ? {} : undefined)));
-        try {
-          await runInSlices(advance, signal, budgetMs);
-        } finally {
-          work.free();
-        }
+        await finishInSlices(work, (one) => this.#handle.use((raw) => (one.advance(raw) ? {} : undefined)), slices);
       },
     };
   }

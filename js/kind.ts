@@ -4,7 +4,7 @@ import type { VesicleError } from './error.js';
 /** The property of the library's objects that tells what they are, to other entry points and copies of the package, too. */
 const KIND = Symbol.for('vesicle kind');
 
-/** Where an object is that is none of this entry point. */
+/** The class of an object, and whether it is a proxy of one in a worker. */
 type Kind = { name: string; isRemote: boolean };
 
 /** Marks the objects of a class. */

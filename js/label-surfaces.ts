@@ -6,9 +6,9 @@ import { Handle } from './runtime.js';
 import { isOfSmall, limitOf, MOST_LABEL_VERTICES_OF_SMALL } from './small-files.js';
 import {
   checkedSlices,
+  finishInSlices,
   Runner,
   type RunOptions,
-  runInSlices,
   type SliceOptions,
   type Stepper,
   type StepReport,
@@ -111,17 +111,13 @@ export class LabelSurfaces implements Omit<Stepper, 'mesh'> {
    * @throws As the constructor; `signal.reason` when aborted.
    */
   static async create(given: LabelOptions, options?: SliceOptions): Promise<LabelSurfaces> {
-    const { signal, budgetMs } = checkedSlices(options);
-    signal?.throwIfAborted();
+    const slices = checkedSlices(options);
+    slices.signal?.throwIfAborted();
     const { volume, image, wanted, params, most } = checked(given);
     const begin = () => image.use((raw) => new RawLabelCreation(raw, wanted, params, most));
     const creation = new Handle('LabelSurfaces', begin);
-    try {
-      const raw = await runInSlices(() => creation.use((one) => one.advance()), signal, budgetMs);
-      return new LabelSurfaces(new Created(volume, new Handle('LabelSurfaces', () => raw)) as unknown as LabelOptions);
-    } finally {
-      creation.free();
-    }
+    const raw = await finishInSlices(creation, (one) => one.advance(), slices);
+    return new LabelSurfaces(new Created(volume, new Handle('LabelSurfaces', () => raw)) as unknown as LabelOptions);
   }
 
   /** The labels that have voxels and a surface, in ascending order. */

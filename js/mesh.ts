@@ -38,7 +38,7 @@ import {
 } from './mesh-file.js';
 import { call, Handle } from './runtime.js';
 import { isOfSmall, limitOf, MOST_TRIANGLES_OF_SMALL } from './small-files.js';
-import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
+import { checkedSlices, finishInSlices, type SliceOptions } from './stepper.js';
 import { checkTexture, rawTexture, textureOf } from './texture.js';
 // Entry points without readers of files lack `RawMeshFile`, which an import by name would demand.
 import * as glue from './vesicle.js';
@@ -928,16 +928,11 @@ export class Mesh {
   }
 
   /** Does the work that `begin` begins in slices; returns its value. */
-  async #work<T>(begin: (raw: RawMesh) => RawMeshWork, { signal, budgetMs }: SliceOptions): Promise<T> {
-    signal?.throwIfAborted();
+  async #work<T>(begin: (raw: RawMesh) => RawMeshWork, slices: SliceOptions): Promise<T> {
+    slices.signal?.throwIfAborted();
     const work = new Handle('Mesh', () => this.#handle.use(begin));
-    try {
-      const advance = () => this.#handle.use((raw) => work.use((one) => one.advance(raw)));
-      const [value] = await runInSlices(advance, signal, budgetMs);
-      return value as T;
-    } finally {
-      work.free();
-    }
+    const [value] = await finishInSlices(work, (one) => this.#handle.use((raw) => one.advance(raw)), slices);
+    return value as T;
   }
 
   #refuseWhileChanging(what: string): void {

@@ -5,8 +5,8 @@ import { frameOf, type MeshFrame } from './mesh-file.js';
 import { Handle } from './runtime.js';
 import {
   checkedSlices,
+  finishInSlices,
   type RunOptions,
-  runInSlices,
   SlicedRunner,
   type SliceOptions,
   type Stepper,
@@ -158,16 +158,12 @@ export class MultiresolutionModel implements Stepper {
    * @throws As the constructor; `signal.reason` when aborted.
    */
   static async create(given: MultiresOptions, options?: SliceOptions): Promise<MultiresolutionModel> {
-    const { signal, budgetMs } = checkedSlices(options);
-    signal?.throwIfAborted();
+    const slices = checkedSlices(options);
+    slices.signal?.throwIfAborted();
     const creation = begun(given, (...of) => new RawMultiresCreation(...of));
-    try {
-      const raw = await runInSlices(() => creation.handle.use((one) => one.advance()), signal, budgetMs);
-      const created = new Created(new Handle(NAME, () => raw), creation.warnings, creation.frame);
-      return new MultiresolutionModel(created as unknown as MultiresOptions);
-    } finally {
-      creation.handle.free();
-    }
+    const raw = await finishInSlices(creation.handle, (one) => one.advance(), slices);
+    const created = new Created(new Handle(NAME, () => raw), creation.warnings, creation.frame);
+    return new MultiresolutionModel(created as unknown as MultiresOptions);
   }
 
   /**

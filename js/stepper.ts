@@ -146,6 +146,19 @@ export async function runInSlices<T extends object>(
   }
 }
 
+/** Does work that has begun by calls of `advance` in slices, until one returns the result; frees it, whatever happens. */
+export async function finishInSlices<Work extends { free(): void }, T extends object>(
+  work: Handle<Work>,
+  advance: (work: Work) => T | undefined,
+  { signal, budgetMs }: SliceOptions,
+): Promise<T> {
+  try {
+    return await runInSlices(() => work.use(advance), signal, budgetMs);
+  } finally {
+    work.free();
+  }
+}
+
 /** Calls `work`, and again after reading the data that it needs, until it does not reject with {@link NeedsDataError}. */
 async function withData<T>(work: () => Promise<T>, options: DataOptions): Promise<T> {
   const pause = new EventLoopYield();

@@ -6,8 +6,8 @@ import { Handle } from './runtime.js';
 import { isOfSmall, limitOf, MOST_TRACKED_OF_SMALL, MOST_VOXELS_OF_SMALL } from './small-files.js';
 import {
   checkedSlices,
+  finishInSlices,
   type RunOptions,
-  runInSlices,
   SlicedRunner,
   type SliceOptions,
   type Stepper,
@@ -232,20 +232,16 @@ export class SurfaceTracker implements Stepper {
    * @throws As the constructor; `signal.reason` when aborted.
    */
   static async create(given: TrackingOptions, options?: SliceOptions): Promise<SurfaceTracker> {
-    const { signal, budgetMs } = checkedSlices(options);
-    signal?.throwIfAborted();
+    const slices = checkedSlices(options);
+    slices.signal?.throwIfAborted();
     const known = checked(given);
     const creation = new Handle(
       'SurfaceTracker',
       beginning(known, (of) => new RawTrackerCreation(of)),
     );
-    try {
-      const raw = await runInSlices(() => creation.use((one) => one.advance()), signal, budgetMs);
-      const handle = new Handle('SurfaceTracker', () => raw);
-      return new SurfaceTracker(new Created(known, handle) as unknown as TrackingOptions);
-    } finally {
-      creation.free();
-    }
+    const raw = await finishInSlices(creation, (one) => one.advance(), slices);
+    const handle = new Handle('SurfaceTracker', () => raw);
+    return new SurfaceTracker(new Created(known, handle) as unknown as TrackingOptions);
   }
 
   /**
@@ -260,20 +256,15 @@ export class SurfaceTracker implements Stepper {
    *   `too-large`; `signal.reason` when aborted.
    */
   static async propose(volume: Volume, query?: ObjectQuery, options?: SliceOptions): Promise<TrackingProposal> {
-    const { signal, budgetMs } = checkedSlices(options);
-    signal?.throwIfAborted();
+    const slices = checkedSlices(options);
+    slices.signal?.throwIfAborted();
     const image = volumeHandle('volume', volume);
     const known = checkProperties<ObjectQuery>('query', query, ['point', 'frame', 'box']);
     const [at, box] = [known.point && vec3('point', known.point), corners(known.box)];
     if (at && box) throw invalid('box', 'give either point or box, not both');
     const frame = integer('frame', known.frame ?? 0);
     const proposal = new Handle('SurfaceTracker', () => image.use((raw) => new RawProposal(raw, at, frame, box)));
-    try {
-      const advance = () => proposal.use((one) => one.advance() as TrackingProposal | undefined);
-      return await runInSlices(advance, signal, budgetMs);
-    } finally {
-      proposal.free();
-    }
+    return finishInSlices(proposal, (one) => one.advance() as TrackingProposal | undefined, slices);
   }
 
   /**

@@ -28,7 +28,7 @@ import {
   noted,
   notedLike,
 } from './small-files.js';
-import { checkedSlices, runInSlices, type SliceOptions } from './stepper.js';
+import { checkedSlices, finishInSlices, type SliceOptions } from './stepper.js';
 import * as glue from './vesicle.js';
 import { RawVolume } from './vesicle.js';
 import { bytesOf, readerArguments } from './volume-file.js';
@@ -356,24 +356,20 @@ export class Volume {
    * @throws {@link VesicleError} `invalid-argument`.
    */
   inSlices(options?: SliceOptions): VolumeInSlices {
-    const { signal, budgetMs } = checkedSlices(options);
+    const slices = checkedSlices(options);
     // Throws if the volume was freed.
     this.#handle.use(() => undefined);
     return {
       enrichSlices: async (given = {}) => {
         const [factor, byFlow] = enrichment(given);
-        signal?.throwIfAborted();
+        slices.signal?.throwIfAborted();
         const most = limitOf(undefined, isOfSmall(this), MOST_ENRICHED_OF_SMALL);
         const work = new Handle('Volume', () => this.#handle.use((raw) => raw.enrichInSlices(factor, byFlow, most)));
-        try {
-          const raw = await runInSlices(() => work.use((one) => one.advance()), signal, budgetMs);
-          return notedLike(
-            this,
-            wrap(() => raw),
-          );
-        } finally {
-          work.free();
-        }
+        const raw = await finishInSlices(work, (one) => one.advance(), slices);
+        return notedLike(
+          this,
+          wrap(() => raw),
+        );
       },
     };
   }

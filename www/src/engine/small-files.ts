@@ -29,13 +29,13 @@ export function tooManyLabels(labels: number): string | undefined {
   return text('segment.tooManyOfSmall', { labels, most: MOST_LABELS_OF_SMALL, kilobytes: SMALL / 2 ** 10 });
 }
 
-/** Returns whether data are in small files, or in a small session, which has them. */
 /** A session, as far as it says how large its data are. */
 interface Sized {
   isSmall?: boolean;
   source: { files: readonly { content?: unknown }[] };
 }
 
+/** Returns whether data are in small files, or in a small session, which has them. */
 export function isOfSmall(session: Sized | undefined, files: readonly (Blob | NamedBytes)[] | undefined): boolean {
   if (session?.isSmall && session.source.files.every(({ content }) => content)) return true;
   return files !== undefined && areSmall(files);
