@@ -72,8 +72,13 @@ export async function openApp(
   return { page, address: server.address, complaints, close: () => closeAll(browser, server) };
 }
 
-/** Agrees at once to lose what is not saved, unless a test sets `data-asked` at the page's root. */
+/**
+ * Agrees at once to lose what is not saved, unless a test sets `data-asked` at the page's root, and does not have the browser
+ * keep it.
+ */
 function agree(): void {
+  // Blank pages have no storage.
+  if (location.protocol === 'http:') localStorage.setItem('vesicle.keep', 'no');
   const answer = () => {
     if (document.documentElement.dataset.asked === undefined)
       document.querySelector<HTMLElement>('dialog.question[open] button[value=go]')?.click();

@@ -94,6 +94,8 @@ const whole = (text: string, steps = [{ id: 'a' }]) =>
 test('what would keep the page busy is refused', () => {
   expect(whole(`# T\n\n## S\n${'$x$ '.repeat(600)}`).steps).toHaveLength(1);
   expect(() => whole(`# T\n\n## S\n${'$x$ '.repeat(15_000)}`)).toThrow('at most 600 formulas');
+  expect(whole(`# T\n\n## S\n${'[a] '.repeat(4_000)}`).steps).toHaveLength(1);
+  expect(() => whole(`# T\n\n## S\n${'['.repeat(5_001)}`)).toThrow('at most 5000 opening square brackets');
   const matrices = `$\\begin{matrix}${'&'.repeat(960)}\\end{matrix}$ `.repeat(5);
   expect(() => whole(`# T\n\n## S\n${matrices}`)).toThrow('at most 500 cells in all formulas');
   const deep = (depth: number) => whole(`# T\n\n## S\n$${'\\sqrt{'.repeat(depth)}x${'}'.repeat(depth)}$`);
@@ -114,7 +116,7 @@ test('what would keep the page busy is refused', () => {
   const row = `${'|a'.repeat(20)}|\n`;
   const table = `# T\n\n## S\n${row}${'|-'.repeat(20)}|\n${row.repeat(2_000)}`;
   expect(() => whole(table)).toThrow('at most 5000 cells of tables');
-  for (const many of ['x\n\n', '- x\n', '`x` ', '[x](https://x.org) ', '*x* '])
+  for (const many of ['x\n\n', '- x\n', '`x` ', '<https://x.org> ', '*x* '])
     expect(() => whole(`# T\n\n## S\n${many.repeat(6_000)}`)).toThrow('at most 5000 paragraphs');
   expect(() => whole(`# T\n\n## S\n$$${'x'.repeat(2000)}$$`)).toThrow('characters in a formula');
   expect(() => whole('# T\n\n## S\n'.padEnd(250_000))).toThrow('at most 200000 characters');

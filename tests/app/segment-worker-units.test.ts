@@ -62,3 +62,28 @@ test('a label map in a small file has at most 400 labels', async () => {
     '401 labels; from files of at most 128 KiB, the app shows at most 400',
   );
 });
+
+test('of two volumes without a telling name, the label map is the one of integers', async () => {
+  const file = (name: string, type: string, bytes: Uint8Array) => {
+    const head = `NRRD0004\ntype: ${type}\ndimension: 3\nsizes: 16 16 16\nendian: little\nencoding: raw\n\n`;
+    return { name, bytes: new Uint8Array(Buffer.concat([Buffer.from(head), bytes])) };
+  };
+  const integers = file(
+    'a.nrrd',
+    'uint8',
+    Uint8Array.from({ length: 16 ** 3 }, (_, k) => (k * 7919) % 97),
+  );
+  // Fewer values than the other one.
+  const ramp = file(
+    'b.nrrd',
+    'float',
+    new Uint8Array(Float32Array.from({ length: 16 ** 3 }, (_, k) => (k % 16) / 10).buffer),
+  );
+  for (const files of [
+    [integers, ramp],
+    [ramp, integers],
+  ]) {
+    const opened = await worker.request('open', { name: 'both', source: { files }, params: {}, labels: undefined });
+    expect(opened.labelFile).toBe('a.nrrd');
+  }
+});

@@ -3,7 +3,7 @@ import { readdirSync, readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import ts from 'typescript';
 import { expect, test } from 'vitest';
-import { plural, type TextKey, text, textNodes } from '../../www/src/texts';
+import { legible, plural, type TextKey, text, textNodes } from '../../www/src/texts';
 import german from '../../www/src/texts/de.json';
 import catalogue from '../../www/src/texts/en.json';
 
@@ -104,6 +104,17 @@ const UNTRANSLATED = [
   ...['shell', 'lessons', 'bench', 'segment', 'pointPanels'],
   ...['extractPresets', 'reconstructPresets', 'trackPresets', 'sculptPresets'],
 ];
+
+test('characters keep the marks that scripts have, and no more than eight', () => {
+  const plain = ['Ångström', 'ภาษาไทยที่', 'हिन्दी', 'x\u0302\u0305\u0323', '👩‍👩‍👧‍👦', '👍🏽', '🏴󠁧󠁢󠁳󠁣󠁴󠁿'];
+  for (const one of plain) expect(legible(one)).toBe(one);
+  for (const mark of ['\u0300', '🏿', '\u{e0061}', '\u200c', '\u093e'])
+    expect(legible(`a${mark.repeat(20_000)}b`)).toBe(`a${mark.repeat(8)}b`);
+  // Quoted text, too.
+  expect(text('labs.opening', { name: `x${'\u0300'.repeat(900)}` })).toBe(
+    text('labs.opening', { name: `x${'\u0300'.repeat(8)}` }),
+  );
+});
 
 test('German lacks no text of the sections that are translated', () => {
   const translated = textsOf(german);

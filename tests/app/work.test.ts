@@ -1,7 +1,7 @@
-/** Work that is not saved: whoever leaves it is asked first. */
+/** Work that is not saved: whoever would lose it is asked first. */
 import type { Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, expect, test } from 'vitest';
-import { type App, anotherPage, drop, measures, open, openApp, QUICK, reach, unfold } from './browser';
+import { type App, anotherPage, drop, iteration, measures, open, openApp, QUICK, reach, unfold } from './browser';
 import { LONG } from './long';
 
 let app: App;
@@ -43,69 +43,19 @@ async function answer(go: boolean, ...losses: string[]): Promise<void> {
 
 const lab = () => page.locator('#labs [aria-current=page]').getAttribute('data-lab');
 
-/** Paints where the crosshair is. */
-async function paint(): Promise<void> {
-  await page.locator('input[data-tool=brush]').check({ force: true });
-  await page.locator('[data-action=apply]').click();
-  await expect.poll(() => page.locator('[data-transport=undo]').isDisabled()).toBe(false);
-}
-
-test('labels that were painted: another lab, going back, other data, and loading again ask first', LONG, async () => {
-  await openLab('extract?example=linked-rings');
-  await page.click('#labs [data-lab=segment]');
-  await reach(page, 'done');
-  // Nothing is lost yet.
-  expect(await lab()).toBe('segment');
-  await paint();
-  const address = page.url();
-  await page.click('#labs [data-lab=track]');
-  await answer(false, 'labels that you have painted');
-  expect([await lab(), page.url()]).toEqual(['segment', address]);
-  await page.goBack();
-  await answer(false);
-  expect([await lab(), page.url()]).toEqual(['segment', address]);
-  await drop(page, [{ name: 'other.nrrd', bytes: new TextEncoder().encode('NRRD0004\n') }]);
-  await answer(false, 'Open other data');
-  await page.evaluate(() => {
-    location.hash = '#segment?example=tooth';
-  });
-  await answer(false);
-  expect(page.url()).toBe(address);
+/** Loads the page again, which has to ask first, and stays. */
+async function reload(): Promise<void> {
   const asked = page.waitForEvent('dialog');
   const again = page.evaluate(() => location.reload());
   const dialog = await asked;
   expect(dialog.type()).toBe('beforeunload');
   await dialog.dismiss();
   await again.catch(() => undefined);
-  expect(await page.locator('[data-transport=undo]').isDisabled()).toBe(false);
-  await page.click('#labs [data-lab=track]');
-  await answer(true);
-  await page.waitForSelector('#labs [data-lab=track][aria-current=page]');
-});
+}
 
-test('a run that was started, and nothing once its surface is saved', LONG, async () => {
-  await openLab(QUICK.extract);
-  // The app itself has run the example.
-  await page.click('#labs [data-lab=sculpt]');
-  await page.waitForSelector('#labs [data-lab=sculpt][aria-current=page]');
-  await openLab(QUICK.extract);
-  await page.keyboard.press('r');
-  await reach(page, 'paused');
-  await page.keyboard.press('s');
-  await page.waitForFunction(() => document.querySelector('[data-state=paused]'));
-  await page.click('#labs [data-lab=sculpt]');
-  await answer(false, 'surface of this run');
-  await unfold(page);
-  const [file] = await Promise.all([page.waitForEvent('download'), page.locator('[data-export=ply]').first().click()]);
-  expect(file.suggestedFilename()).toMatch(/ply$/);
-  await page.click('#labs [data-lab=sculpt]');
-  await page.waitForSelector('#labs [data-lab=sculpt][aria-current=page]');
-});
-
-test('edits of a surface: a crash of their worker loses none, and other data ask first', LONG, async () => {
-  const own = page;
-  page = await anotherPage(app, () => {
-    // Breaks the worker that was started last, as a lack of memory does.
+/** Opens a lab in another page, whose `crash` breaks the worker that was started last, as a lack of memory does. */
+async function breakable(address: string): Promise<Page> {
+  const another = await anotherPage(app, () => {
     window.Worker = class extends Worker {
       constructor(url: string | URL, options?: WorkerOptions) {
         super(url, options);
@@ -114,9 +64,82 @@ test('edits of a surface: a crash of their worker loses none, and other data ask
       }
     };
   });
-  await open({ ...app, page }, QUICK.extract);
+  page = another;
+  await open({ ...app, page: another }, address);
   await ask();
+  await reach(another, 'done');
+  return another;
+}
+
+/** Paints where the crosshair is. */
+async function paint(): Promise<void> {
+  await page.locator('input[data-tool=brush]').check({ force: true });
+  await page.locator('[data-action=apply]').click();
+  await expect.poll(() => page.locator('[data-transport=undo]').isDisabled()).toBe(false);
+}
+
+test('labels that were painted: other data and loading again ask first', LONG, async () => {
+  await openLab(QUICK.segment);
+  await paint();
+  const address = page.url();
+  await drop(page, [{ name: 'other.nrrd', bytes: new TextEncoder().encode('NRRD0004\n') }]);
+  await answer(false, 'Open other data', 'labels that you have painted');
+  await page.evaluate(() => {
+    location.hash = '#segment?example=tooth';
+  });
+  await answer(false);
+  expect(page.url()).toBe(address);
+  await reload();
+  expect(await page.locator('[data-transport=undo]').isDisabled()).toBe(false);
+});
+
+test(
+  'a run that was started comes back; loading again asks, and no longer once its surface is saved',
+  LONG,
+  async () => {
+    await openLab(QUICK.extract);
+    await page.keyboard.press('r');
+    await reach(page, 'paused');
+    await page.keyboard.press('s');
+    await page.waitForFunction(() => document.querySelector('[data-state=paused]'));
+    const before = [await iteration(page), await measures(page)];
+    await page.click('#labs [data-lab=sculpt]');
+    await page.waitForSelector('#labs [data-lab=sculpt][aria-current=page]');
+    await reload();
+    await page.click('#labs [data-lab=extract]');
+    await page.waitForSelector('#lab.extract[data-state=paused]');
+    expect([await iteration(page), await measures(page)]).toEqual(before);
+    await reload();
+    await unfold(page);
+    const [file] = await Promise.all([
+      page.waitForEvent('download'),
+      page.locator('[data-export=ply]').first().click(),
+    ]);
+    expect(file.suggestedFilename()).toMatch(/ply$/);
+    await page.reload();
+  },
+);
+
+test('a lab that cannot be kept, since its engine has failed, asks before it is left', LONG, async () => {
+  const own = page;
+  page = await breakable(QUICK.segment);
+  await paint();
   await reach(page, 'done');
+  await page.evaluate(() => (window as unknown as { crash: () => void }).crash());
+  await page.waitForSelector('[data-state=error]');
+  await page.click('#labs [data-lab=track]');
+  await answer(false, 'labels that you have painted');
+  expect(await lab()).toBe('segment');
+  await page.click('#labs [data-lab=track]');
+  await answer(true);
+  await page.waitForSelector('#labs [data-lab=track][aria-current=page]');
+  await page.close();
+  page = own;
+});
+
+test('edits of a surface: a crash of their worker loses none, and other data ask first', LONG, async () => {
+  const own = page;
+  page = await breakable(QUICK.extract);
   await page.getByRole('heading', { name: 'Edit the surface' }).click();
   const edits = () => page.locator('.edit-log li').count();
   for (const [count, edit] of ['keep-largest', 'cut'].entries()) {

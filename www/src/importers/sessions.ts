@@ -2,7 +2,8 @@
 
 /** Name of the file in a session that describes it. */
 export const INDEX = 'session.json';
-const ENDING = '.vesicle.zip';
+/** Ending of the names of sessions. */
+export const ENDING = '.vesicle.zip';
 
 /** Returns whether a file is a session by its name. */
 export const isNamedSession = (file: File) => file.name.toLowerCase().endsWith(ENDING);

@@ -5,6 +5,8 @@ import { h, uniqueId, wideButton } from './dom';
 export interface SessionEvents {
   /** Saves a session; `included`: with the data that it was made from. */
   onSaveSession: (included: boolean) => void;
+  /** Shows what is kept of work that is not saved. */
+  onShowKept: () => void;
 }
 
 /** The wishes about code that repeats the run, in labs whose model runs. */
@@ -20,13 +22,14 @@ export class SessionControls {
   readonly #buttons: HTMLButtonElement[] = [];
 
   /** `help` describes a session of the lab. */
-  constructor({ onSaveSession }: SessionEvents, help: string) {
+  constructor({ onSaveSession, onShowKept }: SessionEvents, help: string) {
     const included = h('input', { type: 'checkbox', 'data-session': 'included' });
     this.element = h(
       'div',
       { class: 'session' },
       ...this.#action('session', text('sessions.save'), help, () => onSaveSession(included.checked)),
       h('label', { class: 'check' }, included, text('sessions.include')),
+      wideButton(text('kept.open'), 'kept', onShowKept),
     );
   }
 

@@ -1,5 +1,5 @@
 import { keyOf, merged, type Place, placeText, type Warning } from '../engine/warnings';
-import { plural, text } from '../texts';
+import { legible, plural, text } from '../texts';
 import { h, icon } from './dom';
 
 /** A triangle with an exclamation mark. */
@@ -118,7 +118,7 @@ export class WarningList {
 
   #item({ code, text: words, where }: Warning): HTMLElement {
     const place = where ? [this.#place(where), ' '] : [];
-    return h('li', { 'data-code': code }, ...place, words);
+    return h('li', { 'data-code': code }, ...place, legible(words));
   }
 
   /** Returns the place in words, as a button if there is a way to go there. */

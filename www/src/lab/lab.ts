@@ -3,7 +3,22 @@ import type { ParamValues } from '../engine/protocol';
 import type { Warning } from '../engine/warnings';
 import type { LAB_IDS } from './address';
 import type { Session } from './session/file';
-import type { Work } from './work';
+import type { Work, WorkKind } from './work';
+
+/** A lab as it is, so that it can be brought back. */
+export interface Captured {
+  /** Name of the data. */
+  name: string;
+  /** Address of the data with the settings in force. */
+  hash: string;
+  session: File;
+  /** The files that the session needs: the same list as long as the data stay open. */
+  data: readonly File[];
+  /** Whether the data are nowhere but in the app. */
+  isMade: boolean;
+  /** Kinds of work in it that is not saved. */
+  kinds: readonly WorkKind[];
+}
 
 /**
  * Data that one lab passes to another: a volume for Extract, with suitable parameters, a mesh for Sculpt, or a session of
@@ -14,6 +29,8 @@ export interface Handoff {
   lab: (typeof LAB_IDS)[number];
   /** The session, if it is one; name, bytes and parameters are then empty. */
   session?: Session;
+  /** The lab as it was, if it is to be brought back; name, bytes and parameters are then empty. */
+  captured?: Captured;
   name: string;
   /** Content of a volume or mesh file. */
   bytes: Uint8Array;
@@ -26,6 +43,16 @@ export interface Handoff {
 export interface Lab {
   /** The work of the user that is not saved. */
   readonly work: Work;
+  /** Whether the model runs, so that the lab is not the same for long. */
+  readonly isRunning: boolean;
+  /** Whether its address alone brings the lab back as it is. */
+  readonly isPlain: boolean;
+  /** Called when the lab may have become another than it was. */
+  onChange: () => void;
+  /** Called when the user asks what is kept of unsaved work. */
+  onShowKept: () => void;
+  /** Returns the lab as it is; undefined if that cannot be saved now. */
+  capture(): Promise<Captured | undefined>;
   start(passedOn?: Handoff): Promise<void>;
   /** Releases the worker, GPU memory and event listeners. */
   close(): void;
@@ -37,7 +64,7 @@ export type OpenInLab = (passedOn: Handoff) => void;
 /** A lab as the page lists it, before its code is loaded. */
 export interface LabKind {
   /** The lab's name in addresses, after the #. */
-  id: string;
+  id: (typeof LAB_IDS)[number];
   name: string;
   tagline: string;
   /** Address of the lab's page in the documentation. */

@@ -3,16 +3,17 @@ import type { Finish } from '../finish';
 import { anyForeign, noted } from '../importers';
 import { readFiles } from '../importers/files';
 import { isLesson } from '../importers/lessons';
-import { isNamedSession, isSession } from '../importers/sessions';
+import { ENDING, isNamedSession, isSession } from '../importers/sessions';
 import type { ErrorBanner, StatusLine } from '../kit/status';
 import type { WarningList } from '../kit/warnings';
 import { text } from '../texts';
 import type { LAB_IDS } from './address';
-import type { Handoff, OpenInLab } from './lab';
+import type { Captured, Handoff, OpenInLab } from './lab';
 import type { Opening, Source } from './opening';
 import type { Saving } from './saving';
-import type { Session, SourceFile } from './session/file';
+import type { NewSession, Session, SourceFile } from './session/file';
 import type { LabStates } from './states';
+import type { Work, WorkKind } from './work';
 
 /** A lab, as its sessions need it. */
 interface SessionLab {
@@ -25,6 +26,7 @@ interface SessionLab {
     finish?: Finish | undefined;
   };
   states: LabStates;
+  work: Work;
   // biome-ignore lint/suspicious/noExplicitAny: sessions do not look into links, data and models
   opening: Opening<any, any, any, any>;
   passOn: OpenInLab;
@@ -39,11 +41,27 @@ interface SessionLab {
 
 const format = () => import('./session/file');
 
+/** Largest size in bytes of data that are captured with a lab; those of larger ones have to be opened again. */
+const MOST_CAPTURED = 2 ** 29;
+
+/** The data of a source as sessions describe them, and as files. */
+interface Described {
+  source: object;
+  files: SourceFile[];
+  data: File[];
+}
+
+type OpenSource = NonNullable<SessionLab['opening']['source']>;
+
 /** Saves a lab's sessions as files, and opens such files, in the right lab and with the right data. */
 export class Sessions {
   readonly #lab: SessionLab;
   /** The session that waits until the user opens its data. */
   #waiting: Session | undefined;
+  /** The data of the source that was captured last. */
+  #described: Described | undefined;
+  /** Kinds of unsaved work in sessions that bring a lab back. */
+  readonly #kinds = new WeakMap<Session, readonly WorkKind[]>();
 
   constructor(lab: SessionLab) {
     this.#lab = lab;
@@ -71,16 +89,17 @@ export class Sessions {
     }
   }
 
-  /** Opens a session that another lab passes on; returns undefined if it passes on something else. */
-  passedOn({ session }: Handoff): Promise<void> | undefined {
+  /**
+   * Opens a session that another lab passes on, or brings the lab back; returns undefined if something else is passed on.
+   */
+  passedOn({ session, captured }: Handoff): Promise<void> | undefined {
     const { states, opening } = this.#lab;
-    return (
-      session &&
-      this.#open(session).catch(async (error) => {
-        if (!opening.source) await opening.default();
-        states.fail(text('labs.openFailed', { name: session.source.name }), error);
-      })
-    );
+    const name = session?.source.name ?? captured?.name ?? '';
+    const opened = session ? this.#open(session) : captured && this.#bringBack(captured);
+    return opened?.catch(async (error) => {
+      if (!opening.source) await opening.default();
+      states.fail(text('labs.openFailed', { name }), error);
+    });
   }
 
   /** Forgets the session that waits for its data, if one does. */
@@ -95,24 +114,14 @@ export class Sessions {
     if (source && states.canChange) await states.enqueue(() => this.#save(source, included));
   }
 
-  async #save(source: NonNullable<SessionLab['opening']['source']>, included: boolean): Promise<void> {
-    const { id: lab, opening, ui, states, address, content } = this.#lab;
+  async #save(source: OpenSource, included: boolean): Promise<void> {
+    const { opening, ui, states } = this.#lab;
     try {
       ui.status.say(text('sessions.saving'));
-      // A run that is paused and continued ends them.
-      const { log: edits = [], undone = [] } = ui.finish ?? {};
-      const warnings = ui.warnings.all;
-      const [{ describe, writeSession }, body, data] = await Promise.all([format(), content(), source.load()]);
-      if (!body) throw new Error(text('sessions.notSaved'));
+      const [{ describe, writeSession }, content, data] = await Promise.all([format(), this.#content(), source.load()]);
+      if (!content) throw new Error(text('sessions.notSaved'));
       const files = await describe(opening.filesOf(data), included || source.isMade === true);
-      const example: string | undefined = source.example?.id;
-      const from = { name: source.name, files, ...(example !== undefined && { example }) };
-      const bytes = await writeSession({
-        lab,
-        hash: address(source),
-        source: from,
-        content: { ...body, edits, undone, ...(warnings.length > 0 && { warnings }) },
-      });
+      const bytes = await writeSession(this.#sessionOf(source, files, content));
       ui.saving.bytes('vesicle.zip', bytes, 'application/zip');
       this.#lab.onSaved();
     } catch (error) {
@@ -120,17 +129,74 @@ export class Sessions {
     }
   }
 
+  /** Returns the lab's part of a session, with the edits of its surface and its warnings. */
+  async #content(): Promise<object | undefined> {
+    const { ui, content } = this.#lab;
+    // A run that is paused and continued ends them.
+    const { log: edits = [], undone = [] } = ui.finish ?? {};
+    const [warnings, kept] = [ui.warnings.all, { edits: [...edits], undone: [...undone] }];
+    const body = await content();
+    return body && { ...body, ...kept, ...(warnings.length > 0 && { warnings }) };
+  }
+
+  #sessionOf(source: OpenSource, files: SourceFile[], content: object): NewSession {
+    const example: string | undefined = source.example?.id;
+    const from = { name: source.name, files, ...(example !== undefined && { example }) };
+    return { lab: this.#lab.id, hash: this.#lab.address(source), source: from, content };
+  }
+
+  /** Returns the lab as it is, after all changes that are under way; undefined if it cannot be saved. */
+  async capture(): Promise<Captured | undefined> {
+    const { opening, states, work } = this.#lab;
+    const { source } = opening;
+    if (!source || !states.canChange) return undefined;
+    const [{ writeSession }, { files, data }] = await Promise.all([format(), this.#describe(source)]);
+    const { kinds } = work;
+    const made = await states.inTurn(async () => {
+      if (opening.source !== source || !states.canChange) return undefined;
+      const content = await this.#content();
+      return content && this.#sessionOf(source, files, content);
+    });
+    if (!made) return undefined;
+    const session = new File([(await writeSession(made)) as BlobPart], `${source.name}${ENDING}`);
+    return { name: source.name, hash: made.hash, session, data, isMade: source.isMade === true, kinds };
+  }
+
+  /** Returns the data of a source, which are read once as long as it is open. */
+  async #describe(source: OpenSource): Promise<Described> {
+    if (this.#described?.source === source) return this.#described;
+    const named = this.#lab.opening.filesOf(await source.load());
+    const files = await (await format()).describe(named, false);
+    const size = files.reduce((sum, file) => sum + file.size, 0);
+    const isNeeded = source.example === undefined && size <= MOST_CAPTURED;
+    const data = isNeeded ? named.map(({ name, bytes }) => new File([bytes as BlobPart], name)) : [];
+    this.#described = { source, files, data };
+    return this.#described;
+  }
+
+  /** Brings the lab back as it was captured. */
+  async #bringBack({ session: file, data, isMade, kinds }: Captured): Promise<void> {
+    const session = { ...(await this.#readFile(file)), isSmall: false };
+    this.#kinds.set(session, kinds);
+    if (isMade) await this.#open(await withData(session, data));
+    else if (data.length > 0) await this.#complete(session, [...data]);
+    else await this.#open(session);
+  }
+
   /** Opens a session; `beside`: the data that it waits for, if they are there already. */
   async #read(file: File, beside: File[]): Promise<void> {
-    const { readApart } = await import('./session/apart');
-    const read = await readApart(new Uint8Array(await file.arrayBuffer()));
-    const session: Session = { ...read, isSmall: areSmall([file]) };
+    const session: Session = { ...(await this.#readFile(file)), isSmall: areSmall([file]) };
     if (beside.length > 0) {
       if (session.lab !== this.#lab.id || !waits(session)) throw new Error(text('sessions.alone'));
       this.#waiting = session;
       await this.#complete(session, beside);
     } else if (session.lab === this.#lab.id) await this.#open(session);
     else this.#lab.passOn({ lab: session.lab, session, name: '', bytes: new Uint8Array(), params: {} });
+  }
+
+  async #readFile(file: File): Promise<Session> {
+    const { readApart } = await import('./session/apart');
+    return readApart(new Uint8Array(await file.arrayBuffer()));
   }
 
   /** Opens a session, or asks for its data if it has none. */
@@ -155,6 +221,7 @@ export class Sessions {
     ui.warnings.restore(warnings);
     const repeated = ui.finish?.repeat(edits, undone, session.isSmall);
     await repeated?.catch((error) => states.fail(text('sessions.editsFailed'), error));
+    for (const kind of this.#kinds.get(session) ?? []) this.#lab.work.did(kind);
   }
 
   /** Opens the session that waits for its data, if these are among `files`. */
@@ -178,6 +245,13 @@ async function sessionAmong(files: File[]): Promise<File | undefined> {
   const [session, ...more] = files.filter(isNamedSession);
   if (more.length > 0) throw new Error(text('sessions.alone'));
   return session;
+}
+
+/** Returns a session with the files of its data, which are as many as it describes. */
+async function withData(session: Session, data: readonly File[]): Promise<Session> {
+  const contents = await Promise.all(data.map(async (file) => new Uint8Array(await file.arrayBuffer())));
+  const files = session.source.files.map((file, index) => ({ ...file, content: contents[index] }));
+  return { ...session, source: { ...session.source, files } } as Session;
 }
 
 /** Returns whether a session has neither its data nor an example. */

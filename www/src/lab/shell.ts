@@ -7,7 +7,7 @@ import type { LabState } from '../kit/state';
 import { plural, text } from '../texts';
 import { copyAddress, FILE_NOTE, showAddress } from './address';
 import type { Listed } from './example-panel';
-import type { Handoff, Lab, OpenInLab } from './lab';
+import type { Captured, Handoff, Lab, OpenInLab } from './lab';
 import type { Opening, Source } from './opening';
 import type { LabEvents, LabParts, RunEvents, RunParts } from './parts';
 import { Sessions } from './sessions';
@@ -54,6 +54,8 @@ type AnySource<Example> = Source<Example, unknown, unknown>;
  */
 export abstract class LabShell<Example extends Listed> implements Lab {
   readonly work = new Work();
+  onChange: () => void = () => undefined;
+  onShowKept: () => void = () => undefined;
   protected readonly root: HTMLElement;
   protected readonly passOn: OpenInLab;
   /** Aborted when the lab is closed, which removes all event listeners. */
@@ -99,17 +101,21 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   /** Begins to follow the lab's state and to listen to the keyboard. */
   protected begin(shortcuts: Shortcut[]): void {
     this.#sessions = new Sessions({
-      ...{ id: this.id, ui: this.ui, states: this.states, opening: this.opening, passOn: this.passOn },
+      ...{ id: this.id, ui: this.ui, states: this.states, work: this.work, opening: this.opening, passOn: this.passOn },
       address: (source) => this.address(source),
       content: () => this.sessionContent(),
       onSaved: () => this.work.settled(),
       mayReplace: () => this.mayReplace(),
     });
-    this.opening.onReplaced = () => this.work.settled();
+    this.opening.onReplaced = () => this.work.end();
     this.states.subscribe((state) => this.#showState(state));
     this.states.subscribeCancellable((isCancellable) => this.ui.offerCancel(isCancellable));
     // Until a change is in force, the state and the measures are those of the run before it.
-    this.states.subscribeChanging((isChanging) => this.root.toggleAttribute('data-changing', isChanging));
+    this.states.subscribeChanging((isChanging) => {
+      this.root.toggleAttribute('data-changing', isChanging);
+      if (!isChanging) this.onChange();
+    });
+    this.work.onChange = () => this.onChange();
     const onEscape = {
       key: 'Escape',
       shown: text('labs.keyEscape'),
@@ -129,6 +135,19 @@ export abstract class LabShell<Example extends Listed> implements Lab {
     await this.opening.start(this.closing.signal, { mayFollow: () => this.mayReplace(), onFollowed }, open);
   }
 
+  get isRunning(): boolean {
+    return this.states.value === 'running';
+  }
+
+  get isPlain(): boolean {
+    const { source } = this.opening;
+    return !this.work.isAny && (!source || source.example !== undefined);
+  }
+
+  async capture(): Promise<Captured | undefined> {
+    return this.#sessions?.capture();
+  }
+
   close(): void {
     this.closing.abort();
     this.opening.close();
@@ -146,6 +165,7 @@ export abstract class LabShell<Example extends Listed> implements Lab {
       onDismiss: () => this.dismiss(),
       onCopyLink: () => void this.#copyLink(),
       onSaveSession: (included) => void this.#sessions?.save(included),
+      onShowKept: () => this.onShowKept(),
       onError: (title, error) => this.states.fail(title, error),
     };
   }
@@ -201,6 +221,7 @@ export abstract class LabShell<Example extends Listed> implements Lab {
     this.root.dataset.state = state;
     this.showControls(state);
     if (state === 'done' || state === 'paused') this.updateAddress();
+    this.onChange();
   }
 }
 

@@ -126,9 +126,14 @@ export class LabStates {
    */
   enqueue(work: () => Promise<void>): Promise<void> {
     this.#changes.value += 1;
-    const turn = this.#queue.then(work).finally(() => {
+    return this.inTurn(work).finally(() => {
       this.#changes.value -= 1;
     });
+  }
+
+  /** Runs `work`, which changes nothing, after all changes queued before, and before all later ones. */
+  inTurn<Result>(work: () => Promise<Result>): Promise<Result> {
+    const turn = this.#queue.then(work);
     this.#queue = turn.catch(() => undefined);
     return turn;
   }

@@ -24,6 +24,9 @@ const CELL_END = /&|\\\\|\\(?:cr|newline|tabularnewline)\b/g;
 /** Most cells of tables, as bars between them: laying out 46,000 takes ten seconds. */
 const MOST_CELLS = 5_000;
 
+/** Most opening brackets of a text: looking for the links that 190,000 could begin takes seconds. */
+const MOST_BRACKETS = 5_000;
+
 /** Most elements of all texts, such as paragraphs, links and entries of lists: laying out 47,000 takes three seconds. */
 const MOST_ELEMENTS = 5_000;
 
@@ -44,10 +47,11 @@ export function checkSteps(file: string, steps: number): void {
   if (steps > MOST_STEPS) throw tooMuch(file, text('lessons.stepCount'), MOST_STEPS);
 }
 
-/** Throws an Error if a text is too long, or has too large tables. */
+/** Throws an Error if a text is too long, or has too large tables or too many brackets. */
 export function checkText(file: string, source: string): void {
   checkLength(file, source);
   if (source.split('|').length > MOST_CELLS) throw tooMuch(file, text('lessons.cells'), MOST_CELLS);
+  if (source.split('[').length > MOST_BRACKETS) throw tooMuch(file, text('lessons.brackets'), MOST_BRACKETS);
 }
 
 /** Throws an Error if the formulas of a text are too many, too long, nested too deep, or have too many cells. */

@@ -1,6 +1,6 @@
 /** A lesson: `lesson.json` and its text in Markdown, as docs/lessons.md describes them to authors. */
 import { labOf } from '../lab/address';
-import { text } from '../texts';
+import { legible, text } from '../texts';
 import { checkData, checkElements, checkFormulas, checkSteps, checkText } from './bounds';
 import { type Check, checkProblem, type Operand, operandProblem } from './check';
 import { partsOf } from './formulas';
@@ -54,9 +54,10 @@ const textFile = (language: string) => `text.${language}.md`;
 export function parseLesson(files: LessonFiles, language: string): Lesson {
   const data = parseData(files[DATA]);
   const used = chosenLanguage(data.languages, language);
-  const source = files[textFile(used)];
-  if (source === undefined) throw new Error(text('lessons.noText', { file: textFile(used) }));
-  checkText(textFile(used), source);
+  const given = files[textFile(used)];
+  if (given === undefined) throw new Error(text('lessons.noText', { file: textFile(used) }));
+  checkText(textFile(used), given);
+  const source = legible(given);
   const { title, intro, steps } = parseText(source);
   const texts = [intro, ...steps.flatMap(({ parts }) => Object.values(parts))];
   const parts = texts.map(partsOf);
@@ -102,7 +103,7 @@ interface LessonData {
 function parseData(source: string | undefined): LessonData {
   if (source === undefined) throw new Error(text('lessons.noData', { file: DATA }));
   checkData(DATA, source);
-  const { id, languages, minutes, steps } = parseJson(source);
+  const { id, languages, minutes, steps } = parseJson(legible(source));
   const strings = Array.isArray(languages) && languages.length > 0 && languages.every((one) => typeof one === 'string');
   if (typeof id !== 'string' || !/^[\w-]+$/.test(id)) throw new Error(text('lessons.idInvalid', { file: DATA }));
   if (!strings) throw new Error(text('lessons.languagesInvalid', { file: DATA }));

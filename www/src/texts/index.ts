@@ -40,7 +40,20 @@ export function text(key: TextKey, values: TextValues = {}): string {
 /** Most characters of what a text quotes: it may be from a file, and of any length. */
 const MOST_QUOTED = 1000;
 
-const clipped = (quoted: string) => (quoted.length > MOST_QUOTED ? `${quoted.slice(0, MOST_QUOTED)}…` : quoted);
+function clipped(quoted: string): string {
+  const calm = legible(quoted);
+  return calm.length > MOST_QUOTED ? `${calm.slice(0, MOST_QUOTED)}…` : calm;
+}
+
+/** Combining marks and modifiers of one character beyond those that any script has. */
+const SURPLUS_MARKS =
+  /([\p{M}\p{Grapheme_Extend}\p{Emoji_Modifier}]{8})[\p{M}\p{Grapheme_Extend}\p{Emoji_Modifier}]+/gu;
+
+/**
+ * Returns a text, which may come from anywhere, with at most eight combining marks for each character: laying out one with
+ * thousands of them takes browsers seconds.
+ */
+export const legible = (foreign: string): string => foreign.replace(SURPLUS_MARKS, '$1');
 
 /**
  * Returns the plural form of a text that the language uses for this number, as "1 frame" or "2 frames"; the placeholder

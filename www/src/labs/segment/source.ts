@@ -120,14 +120,18 @@ async function readMap(group: NamedBytes[]): Promise<NamedVolume> {
 }
 
 /**
- * Whether the first of two volumes is the label map: because it names its labels, by its name, or else because it has
- * fewer different values.
+ * Whether the first of two volumes is the label map: because it names its labels, by its name, or else because it alone has
+ * integers, or fewer different values.
  */
 function isMap(one: NamedVolume, other: NamedVolume): boolean {
   const isNamed = ({ name, known }: NamedVolume) => known.length > 0 || /label|seg|mask|annot/i.test(name);
   if (isNamed(one) !== isNamed(other)) return isNamed(one);
+  if (hasIntegers(one) !== hasIntegers(other)) return hasIntegers(one);
   return valuesIn(one) < valuesIn(other);
 }
+
+const hasIntegers = ({ init: { data } }: NamedVolume) =>
+  !(data instanceof Float32Array || data instanceof Float64Array) || data.every(Number.isInteger);
 
 /** Returns the number of different values of a volume, or {@link MOST_LABELS} if there are more. */
 function valuesIn({ init: { data } }: NamedVolume): number {

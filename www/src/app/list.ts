@@ -1,0 +1,58 @@
+import { GUIDES } from '../kit/guides';
+import type { LabKind } from '../lab/lab';
+import { spawnExtract } from '../labs/extract/client';
+import { spawnReconstruct } from '../labs/reconstruct/client';
+import { spawnSculpt } from '../labs/sculpt/client';
+import { spawnSegment } from '../labs/segment/client';
+import { spawnTrack } from '../labs/track/client';
+import { text } from '../texts';
+
+/**
+ * The labs (the app's five pages), in the order of the navigation. If none is open yet, an empty or unknown address
+ * opens the first one.
+ */
+export const LABS: [LabKind, ...LabKind[]] = [
+  {
+    id: 'extract',
+    name: text('shell.extract'),
+    tagline: text('shell.extractTagline'),
+    guide: GUIDES.extract,
+    spawn: spawnExtract,
+    load: async () => (await import('../labs/extract')).ExtractLab,
+  },
+  {
+    id: 'reconstruct',
+    name: text('shell.reconstruct'),
+    tagline: text('shell.reconstructTagline'),
+    guide: GUIDES.reconstruct,
+    spawn: spawnReconstruct,
+    load: async () => (await import('../labs/reconstruct')).ReconstructLab,
+  },
+  {
+    id: 'track',
+    name: text('shell.track'),
+    tagline: text('shell.trackTagline'),
+    guide: GUIDES.track,
+    spawn: spawnTrack,
+    load: async () => (await import('../labs/track')).TrackLab,
+  },
+  {
+    id: 'sculpt',
+    name: text('shell.sculpt'),
+    tagline: text('shell.sculptTagline'),
+    guide: GUIDES.sculpt,
+    spawn: spawnSculpt,
+    load: async () => (await import('../labs/sculpt')).SculptLab,
+  },
+  {
+    id: 'segment',
+    name: text('shell.segment'),
+    tagline: text('shell.segmentTagline'),
+    guide: GUIDES.segment,
+    spawn: spawnSegment,
+    load: async () => (await import('../labs/segment')).SegmentLab,
+  },
+];
+
+/** Returns the lab with this id in addresses, by default the first one. */
+export const labCalled = (id: string | undefined): LabKind => LABS.find((lab) => lab.id === id) ?? LABS[0];
