@@ -202,6 +202,37 @@ test(
   },
 );
 
+test('a lab that is left again before it is back, and one that two pages bring back', LONG, async () => {
+  page = await openTab(QUICK.segment);
+  await paint();
+  const before = await saved(LABEL_MAP);
+  // Twice before it is back.
+  for (const lab of ['track', 'segment', 'track', 'segment', 'track', 'segment']) {
+    await page.click(`#labs [data-lab=${lab}]`);
+    await page.waitForSelector(`#labs [data-lab=${lab}][aria-current=page]`);
+  }
+  await page.waitForSelector('#lab.segment');
+  await reach(page, 'done');
+  expect(Buffer.compare(await saved(LABEL_MAP), before)).toBe(0);
+  await paint();
+  await agree();
+  await expect.poll(stored).toBe(1);
+  const ended = page;
+  const tabs = [await openTab(QUICK.extract), await openTab(QUICK.extract)];
+  await ended.close();
+  for (const tab of tabs) await tab.reload();
+  for (const tab of tabs) {
+    page = tab;
+    await notice()
+      .getByRole('button', { name: /^Bring back/ })
+      .click();
+    await page.waitForSelector('#lab.segment');
+    await reach(page, 'done');
+  }
+  // Each keeps its own, in place of the one that both are from.
+  await expect.poll(stored).toBe(2);
+});
+
 test(
   'loading the page again asks only about what the browser does not keep, and no longer keeps what it shall not',
   LONG,

@@ -23,7 +23,8 @@ beforeAll(async () => {
   home = await mkdtemp(join(tmpdir(), 'vesicle-start-'));
   folder = join(home, 'vesicle');
   await clone();
-  const text = await readFile(at('docs/start.md'), 'utf8');
+  // What follows are fragments.
+  const [text = ''] = (await readFile(at('docs/start.md'), 'utf8')).split('\n## Memory\n');
   // A block with the content of a file follows its name.
   for (const [, name = '', kind, body = ''] of text.matchAll(/(?:`([\w./]+)`:\n\n)?```(\w+)\n([\s\S]*?)```/g)) {
     if (kind === 'sh') await type(body);

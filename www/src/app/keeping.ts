@@ -4,7 +4,7 @@
  */
 import type { Lab } from '../lab/lab';
 import type { WorkKind } from '../lab/work';
-import { BrowserStore, type Kept, type KeptStore, PageStore } from './kept-store';
+import { type Kept, KeptStore } from './kept-store';
 import { newName, openPages, PAGE } from './pages';
 
 /** Milliseconds after a change until the lab is kept, and the least time between two times, as a multiple of what one takes. */
@@ -19,18 +19,24 @@ interface Open {
   lab: Lab;
   kind: string;
   id: string;
-  /** Number of changes, and of those that are kept. */
+  /** Id of what it is brought back from, which is kept until the lab itself is. */
+  from: string | undefined;
+  /** Whether it was brought back. */
+  isBack: boolean;
+  /** Whether there was work in it, since it was opened or before. */
+  hadWork: boolean;
+  /** Number of changes, and of those that the page and the browser keep. */
   changes: number;
   kept: number;
-  /** Whether the store has it. */
-  isStored: boolean;
+  stored: number;
   timer: number;
 }
 
 export class Keeping {
-  #store: KeptStore;
-  /** Labs that this page has left, by their ids in addresses, and whether the store has them. */
-  readonly #left = new Map<string, { kept: Kept; isStored: boolean }>();
+  /** The browser's storage, if the user agrees. */
+  #store: KeptStore | undefined;
+  /** Labs of this page that are kept, by their ids in addresses. */
+  readonly #kept = new Map<string, { kept: Kept; isStored: boolean }>();
   #open: Open | undefined;
   /** Settles when what is being kept is. */
   #turn: Promise<unknown> = Promise.resolve();
@@ -44,7 +50,7 @@ export class Keeping {
   onShowKept: () => void = () => undefined;
 
   constructor() {
-    this.#store = this.isAgreed ? new BrowserStore(openPages) : new PageStore();
+    if (this.choice) this.#store = new KeptStore();
   }
 
   /** Whether the user agrees that the browser keeps labs; undefined if they were not asked. */
@@ -53,30 +59,36 @@ export class Keeping {
     return stored === null ? undefined : stored === 'yes';
   }
 
-  get isAgreed(): boolean {
-    return this.choice === true;
-  }
-
-  /** Takes the user's answer; without their agreement, what the browser has kept is deleted. */
+  /** Takes the user's answer. Without their agreement, what the browser has kept is deleted, but for that of other open pages. */
   async choose(isAgreed: boolean): Promise<void> {
-    if (isAgreed !== this.isAgreed) {
-      if (!isAgreed) await this.forgetAll();
-      this.#store = isAgreed ? new BrowserStore(openPages) : new PageStore();
-      for (const one of this.#left.values()) one.isStored = await this.#put(one.kept);
-      if (this.#open) this.#open.kept = -1;
-    }
     storeChoice(isAgreed);
+    if (isAgreed === (this.#store !== undefined)) return;
+    if (this.#store) await this.#deleteAll(this.#store);
+    this.#store = isAgreed ? new KeptStore() : undefined;
+    for (const one of this.#kept.values()) one.isStored = one.kept.kinds.length > 0 && (await this.#put(one.kept));
+    if (this.#open) this.#open.stored = -1;
     this.#schedule();
   }
 
-  /** Follows a lab that was opened; `id` is that of what was kept of it, if it is brought back. */
-  follow(kind: string, lab: Lab, id: string = newName()): void {
-    const open = { lab, kind, id, changes: 0, kept: 0, isStored: false, timer: 0 };
+  async #deleteAll(store: KeptStore): Promise<void> {
+    const open = await openPages();
+    const all = (await this.#attempt(() => store.all())) ?? [];
+    for (const { id, page } of all) if (page === PAGE || !open.has(page)) await this.#attempt(() => store.delete(id));
+  }
+
+  /** Follows a lab that was opened; `from` is the id of what it was brought back from. */
+  follow(kind: string, lab: Lab, from?: string): void {
+    const open: Open = {
+      ...{ lab, kind, id: newName(), from, isBack: false, hadWork: false },
+      ...{ changes: 0, kept: -1, stored: -1, timer: 0 },
+    };
     this.#open = open;
     lab.onShowKept = () => this.onShowKept();
     lab.onChange = () => {
       if (this.#open !== open) return;
       open.changes += 1;
+      open.isBack ||= lab.work.isResumed;
+      open.hadWork ||= lab.work.isAny;
       this.onChange();
       this.#schedule();
     };
@@ -84,7 +96,7 @@ export class Keeping {
 
   /** Returns the lab that this page has left, if its address is still the one it had, or none in particular. */
   leftAt(kind: string, hash: string): Kept | undefined {
-    const { kept } = this.#left.get(kind) ?? {};
+    const { kept } = this.#kept.get(kind) ?? {};
     return kept && (hash === kept.hash || hash === `#${kind}`) ? kept : undefined;
   }
 
@@ -97,20 +109,16 @@ export class Keeping {
   get lostWithPage(): WorkKind[] {
     const open = this.#open;
     if (this.mayLose) return [];
-    const { isLasting } = this.#store;
-    const isSafe = isLasting && open?.isStored && open.kept === open.changes;
-    const left = [...this.#left].filter(([kind, { isStored }]) => kind !== open?.kind && !(isLasting && isStored));
-    return [
-      ...new Set([...(isSafe ? [] : (open?.lab.work.kinds ?? [])), ...left.flatMap(([, { kept }]) => kept.kinds)]),
-    ];
+    const own = open && open.stored !== open.changes ? open.lab.work.kinds : [];
+    const isOpen = (kind: string) => kind === open?.kind && open.hadWork;
+    const left = [...this.#kept].filter(([kind, { isStored }]) => !isOpen(kind) && !isStored);
+    return [...new Set([...own, ...left.flatMap(([, { kept }]) => kept.kinds)])];
   }
 
-  /** Keeps the open lab at once, if that outlives the page and something has changed. */
+  /** Has the browser keep the open lab at once, if it has changed. */
   async now(): Promise<void> {
     const open = this.#open;
-    if (!open || !this.#store.isLasting || open.kept === open.changes || open.lab.work.kinds.length === 0) return;
-    clearTimeout(open.timer);
-    await this.#keep(open);
+    if (open && this.#store && open.stored !== open.changes && open.lab.work.kinds.length > 0) await this.#keep(open);
   }
 
   /** Keeps the open lab, since it is left; returns whether none of its work is lost. */
@@ -118,84 +126,94 @@ export class Keeping {
     const open = this.#open;
     if (!open) return true;
     clearTimeout(open.timer);
+    // A lab that is not back yet stays as it was kept.
+    if (open.from && !open.hadWork) return true;
     if (open.lab.isPlain) await this.giveUp();
-    else await this.#keep(open);
-    return this.#left.get(open.kind)?.kept.id === open.id || open.lab.work.kinds.length === 0;
+    else await this.#keep(open).catch(() => undefined);
+    return open.kept === open.changes || open.lab.work.kinds.length === 0;
   }
 
   /** Forgets the open lab, since nothing in it is to be kept. */
   async giveUp(): Promise<void> {
-    const open = this.#open;
-    if (!open) return;
-    this.#left.delete(open.kind);
-    await this.#forgetOpen(open);
+    if (!this.#open) return;
+    this.#kept.delete(this.#open.kind);
+    await this.#forget(this.#open);
   }
 
   /** Returns the labs with unsaved work that pages have left behind, which are closed. */
   async leftBehind(): Promise<Kept[]> {
     const open = await openPages();
-    const all = await this.#attempt(() => this.#store.all());
-    return (all ?? []).filter(({ id, page }) => id !== this.#open?.id && !open.has(page));
+    const all = (await this.#attempt(async () => this.#store?.all())) ?? [];
+    return all.filter(({ id, page }) => id !== this.#open?.from && !open.has(page));
   }
 
-  async forget(kept: Kept): Promise<void> {
-    for (const [kind, left] of this.#left) if (left.kept.id === kept.id) this.#left.delete(kind);
-    await this.#attempt(() => this.#store.delete(kept.id));
+  /** Deletes what the browser has kept of another page. */
+  async discard({ id }: Kept): Promise<void> {
+    await this.#attempt(async () => this.#store?.delete(id));
   }
 
-  /** Forgets all that is kept, but for labs in other pages that are open. */
-  async forgetAll(): Promise<void> {
-    const open = await openPages();
-    open.delete(PAGE);
-    const all = (await this.#attempt(() => this.#store.all())) ?? [];
-    for (const kept of all) if (!open.has(kept.page)) await this.forget(kept);
-    this.#left.clear();
-    if (this.#open) this.#open.isStored = false;
-  }
-
-  /** Keeps the open lab a moment later, if that outlives the page. */
+  /** Has the browser keep the open lab a moment later. */
   #schedule(delay = REST.milliseconds): void {
     const open = this.#open;
-    if (!open || !this.#store.isLasting) return;
+    if (!open || !this.#store) return;
     clearTimeout(open.timer);
     open.timer = window.setTimeout(() => void this.#keepInTime(open), open.lab.isRunning ? RUNNING_REST : delay);
   }
 
   async #keepInTime(open: Open): Promise<void> {
     const start = performance.now();
-    if (open.lab.work.kinds.length > 0) await this.#keep(open);
-    else if (open.isStored) await this.#forgetOpen(open);
-    const rest = Math.max(REST.milliseconds, REST.times * (performance.now() - start));
-    if (open === this.#open && open.kept !== open.changes && open.lab.work.kinds.length > 0) this.#schedule(rest);
+    const hasWork = () => open.lab.work.kinds.length > 0;
+    if (hasWork()) await this.#keep(open).catch((error) => this.onFailure(error));
+    else await this.#forget(open);
+    const isDone = open.stored === open.changes && !open.lab.isRunning;
+    if (open !== this.#open || isDone || !hasWork()) return;
+    this.#schedule(Math.max(REST.milliseconds, REST.times * (performance.now() - start)));
   }
 
-  async #forgetOpen(open: Open): Promise<void> {
-    open.isStored = false;
-    await this.#attempt(() => this.#store.delete(open.id));
+  /** Has the browser forget an open lab, and what it was brought back from. */
+  async #forget(open: Open): Promise<void> {
+    if (!open.hadWork) return;
+    open.stored = -1;
+    await this.#attempt(async () => this.#store?.delete(open.id));
+    await this.#forgetOrigin(open);
   }
 
-  /** Keeps a lab as it is, after what is being kept. */
+  /** Keeps a lab as it is, after what is being kept, unless it cannot be saved now. Throws if it cannot be saved at all. */
   #keep(open: Open): Promise<void> {
     const keeping = this.#turn.then(() => this.#keepNow(open));
-    this.#turn = keeping;
+    this.#turn = keeping.catch(() => undefined);
     return keeping;
   }
 
   async #keepNow(open: Open): Promise<void> {
-    const { changes, lab, id, kind } = open;
-    const wasRunning = lab.isRunning;
-    const captured = await lab.capture().catch(() => undefined);
+    const { lab, id, kind } = open;
+    const [before, wasRunning] = [open.changes, lab.isRunning];
+    const captured = await lab.capture();
     if (!captured) return;
-    const kept = { ...captured, id, lab: kind, page: PAGE, time: Date.now() };
-    open.isStored = captured.kinds.length > 0 && (await this.#put(kept));
-    this.#left.set(kind, { kept, isStored: open.isStored });
     // A run that is paused for it has changed twice.
-    open.kept = wasRunning ? open.changes : changes;
+    const changes = wasRunning ? open.changes : before;
+    const kept = { ...captured, id, lab: kind, page: PAGE, time: Date.now() };
+    open.kept = changes;
+    const one = { kept, isStored: false };
+    this.#kept.set(kind, one);
+    one.isStored = kept.kinds.length > 0 && (await this.#put(kept));
+    if (!one.isStored) return;
+    open.stored = changes;
+    await this.#forgetOrigin(open);
   }
 
-  /** Returns whether the store has a lab now. */
+  /** Has the browser forget what a lab was brought back from. */
+  async #forgetOrigin(open: Open): Promise<void> {
+    const { from } = open;
+    if (!from || !open.isBack) return;
+    open.from = undefined;
+    await this.#attempt(async () => this.#store?.delete(from));
+  }
+
+  /** Returns whether the browser keeps a lab now. */
   async #put(kept: Kept): Promise<boolean> {
-    return (await this.#attempt(() => this.#store.put(kept).then(() => true))) ?? false;
+    const store = this.#store;
+    return (store && (await this.#attempt(() => store.put(kept).then(() => true)))) ?? false;
   }
 
   async #attempt<Result>(work: () => Promise<Result>): Promise<Result | undefined> {

@@ -1,6 +1,7 @@
-/** Where labs are kept: in the page, or in the browser's storage, where they outlive the page. */
+/** Labs in the browser's storage, where they outlive the page. */
 import { type DBSchema, type IDBPDatabase, openDB } from 'idb';
 import type { Captured } from '../lab/lab';
+import { openPages } from './pages';
 
 /** A lab that is kept. */
 export interface Kept extends Captured {
@@ -11,35 +12,6 @@ export interface Kept extends Captured {
   page: string;
   /** Milliseconds since 1970 at which it was kept. */
   time: number;
-}
-
-export interface KeptStore {
-  /** Whether what it keeps outlives the page. */
-  readonly isLasting: boolean;
-  /** Keeps a lab, in place of the one with the same id. */
-  put(kept: Kept): Promise<void>;
-  delete(id: string): Promise<void>;
-  /** Returns what is kept, the newest first. */
-  all(): Promise<Kept[]>;
-}
-
-const newestFirst = (all: Kept[]) => all.sort((a, b) => b.time - a.time);
-
-export class PageStore implements KeptStore {
-  readonly isLasting = false;
-  readonly #kept = new Map<string, Kept>();
-
-  async put(kept: Kept): Promise<void> {
-    this.#kept.set(kept.id, kept);
-  }
-
-  async delete(id: string): Promise<void> {
-    this.#kept.delete(id);
-  }
-
-  async all(): Promise<Kept[]> {
-    return newestFirst([...this.#kept.values()]);
-  }
 }
 
 /** Bounds of what the browser keeps. */
@@ -59,16 +31,12 @@ const sizeOf = (files: readonly File[]) => files.reduce((sum, { size }) => sum +
 const bytesOf = ({ session, data }: Kept) => sizeOf([session, ...data]);
 
 /** Labs in the browser's storage, within the bounds of {@link MOST}; the oldest make room. */
-export class BrowserStore implements KeptStore {
-  readonly isLasting = true;
+export class KeptStore {
   readonly #opened: Promise<IDBPDatabase<Schema>>;
   /** The files of each lab that are stored. */
   readonly #stored = new Map<string, readonly File[]>();
-  /** Returns the names of the pages that are open: what they keep makes no room. */
-  readonly #openPages: () => Promise<Set<string>>;
 
-  constructor(openPages: () => Promise<Set<string>>) {
-    this.#openPages = openPages;
+  constructor() {
     this.#opened = openDB<Schema>('vesicle', 1, {
       upgrade: (database) => {
         for (const name of ['labs', 'data'] as const) database.createObjectStore(name, { keyPath: 'id' });
@@ -77,7 +45,7 @@ export class BrowserStore implements KeptStore {
     this.#opened.catch(() => undefined);
   }
 
-  /** Throws {@link TooLargeToKeep}, or an Error of the browser if it has no room. */
+  /** Keeps a lab, in place of the one with the same id. Throws {@link TooLargeToKeep}, or an Error of the browser if it has no room. */
   async put(kept: Kept): Promise<void> {
     const { data: files, ...lab } = kept;
     const { id } = kept;
@@ -100,6 +68,7 @@ export class BrowserStore implements KeptStore {
     this.#stored.delete(id);
   }
 
+  /** Returns what is kept, the newest first. */
   async all(): Promise<Kept[]> {
     const reading = (await this.#opened).transaction(['labs', 'data']);
     const [labs, data] = await Promise.all([
@@ -110,12 +79,12 @@ export class BrowserStore implements KeptStore {
     const all = labs.map((lab) => ({ ...lab, data: files.get(lab.id) ?? [] }));
     const since = Date.now() - MOST.days * DAY_MS;
     await Promise.all(all.filter(({ time }) => time < since).map(({ id }) => this.delete(id)));
-    return newestFirst(all.filter(({ time }) => time >= since));
+    return all.filter(({ time }) => time >= since).sort((a, b) => b.time - a.time);
   }
 
   /** Deletes the oldest labs beyond the bounds, but for the one just kept, and those of pages that are open. */
   async #makeRoom(id: string): Promise<void> {
-    const open = await this.#openPages();
+    const open = await openPages();
     const all = await this.all();
     let bytes = 0;
     for (const [index, kept] of all.entries()) {

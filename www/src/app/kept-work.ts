@@ -24,7 +24,7 @@ export class KeptWork {
     keeping.onShowKept = () => void this.#showDialog();
     keeping.onChange = () => this.#ask();
     keeping.onFailure = (error) => this.#say(text('kept.failed', { message: reasonOf(error) }));
-    if (keeping.isAgreed) void this.#offer();
+    if (keeping.choice) void this.#offer();
   }
 
   /** Offers on the page what is kept of pages that were closed. */
@@ -63,7 +63,7 @@ export class KeptWork {
     const kept = await this.#keeping.leftBehind();
     const [title, help] = [uniqueId('kept'), uniqueId('kept')];
     const close = () => dialog.close();
-    const choice = h('input', { type: 'checkbox', 'aria-describedby': help, checked: this.#keeping.isAgreed });
+    const choice = h('input', { type: 'checkbox', 'aria-describedby': help, checked: this.#keeping.choice === true });
     choice.addEventListener('change', () => {
       void this.#keeping.choose(choice.checked);
       if (!choice.checked) list.remove();
@@ -98,7 +98,7 @@ export class KeptWork {
         onEnd();
         this.#labs.bringBack(one);
       };
-      const discard = () => void this.#keeping.forget(one).then(remove);
+      const discard = () => void this.#keeping.discard(one).then(remove);
       const discarding = this.#button(text('kept.discard'), discard, name);
       entry.append(h('div', {}, this.#button(text('kept.back'), back, name), discarding));
       list.append(entry);

@@ -92,6 +92,10 @@ export class Labs {
     const kind = LABS.find(({ id }) => id === labOf(location.hash));
     if (kind ? kind === this.#kind : this.#kind) return;
     if (!event?.oldURL || !this.#lab) return void this.#open(kind ?? LABS[0]);
+    if (this.#lab.isPlain && !this.#next) {
+      void this.#keeping.leave();
+      return void this.#open(kind ?? LABS[0]);
+    }
     event.stopImmediatePropagation();
     // The address is that of the open lab as long as it is.
     history.replaceState(null, '', event.oldURL);

@@ -221,7 +221,8 @@ export class Sessions {
     ui.warnings.restore(warnings);
     const repeated = ui.finish?.repeat(edits, undone, session.isSmall);
     await repeated?.catch((error) => states.fail(text('sessions.editsFailed'), error));
-    for (const kind of this.#kinds.get(session) ?? []) this.#lab.work.did(kind);
+    const kinds = this.#kinds.get(session);
+    if (kinds) this.#lab.work.resume(kinds);
   }
 
   /** Opens the session that waits for its data, if these are among `files`. */

@@ -18,6 +18,7 @@ export const sentencesOf = (kinds: readonly WorkKind[]): string[] => kinds.map((
 export class Work {
   readonly #unsaved = new Set<WorkKind>();
   #isAny = false;
+  #isResumed = false;
   /** Called after each change of the work. */
   onChange: () => void = () => undefined;
 
@@ -34,15 +35,29 @@ export class Work {
     this.onChange();
   }
 
+  /** Continues work that was brought back, of which these kinds are not saved. */
+  resume(kinds: readonly WorkKind[]): void {
+    for (const kind of kinds) this.#unsaved.add(kind);
+    this.#isAny = true;
+    this.#isResumed = true;
+    this.onChange();
+  }
+
   /** Tells that other data have taken the place of those that the work was on. */
   end(): void {
     this.#isAny = false;
+    this.#isResumed = false;
     this.settled();
   }
 
   /** Whether anything was done since the data were opened, saved or not. */
   get isAny(): boolean {
     return this.#isAny;
+  }
+
+  /** Whether it was brought back. */
+  get isResumed(): boolean {
+    return this.#isResumed;
   }
 
   /** Kinds of work that is not saved. */
