@@ -23,7 +23,7 @@ beforeAll(async () => {
   home = await mkdtemp(join(tmpdir(), 'vesicle-start-'));
   folder = join(home, 'vesicle');
   await clone();
-  // What follows are fragments.
+  // The blocks after that are fragments.
   const [text = ''] = (await readFile(at('docs/start.md'), 'utf8')).split('\n## Memory\n');
   // A block with the content of a file follows its name.
   for (const [, name = '', kind, body = ''] of text.matchAll(/(?:`([\w./]+)`:\n\n)?```(\w+)\n([\s\S]*?)```/g)) {

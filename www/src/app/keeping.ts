@@ -126,7 +126,7 @@ export class Keeping {
     const open = this.#open;
     if (!open) return true;
     clearTimeout(open.timer);
-    // A lab that is not back yet stays as it was kept.
+    // A lab that is not back yet stays kept.
     if (open.from && !open.hadWork) return true;
     if (open.lab.isPlain) await this.giveUp();
     else await this.#keep(open).catch(() => undefined);

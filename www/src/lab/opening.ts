@@ -61,6 +61,22 @@ interface Engine {
   request(kind: 'hello', body: undefined): Promise<{ specs: ParamSpec[] }>;
 }
 
+/** How a lab opens data, whatever its links, data and models are. */
+export interface AnyOpening<Example> {
+  readonly source: Source<Example, unknown, unknown> | undefined;
+  onReplaced: () => void;
+  filesOf(data: unknown): NamedBytes[];
+  start(signal: AbortSignal, following: Following, passedOn?: () => Promise<void>): Promise<void>;
+  close(): void;
+  default(): Promise<void>;
+  example(example: Example): Promise<void>;
+  files(files: File[]): Promise<void>;
+  session(session: Session, files: File[]): Promise<void>;
+  passedOn(handoff: Handoff): Promise<void>;
+  reopen(): Promise<void>;
+  cancel(): Promise<void>;
+}
+
 /**
  * Opens examples, files and links: gets the data and has the worker build a model of it. The newest request wins; when
  * it fails, everything stays as before. Subclasses implement what differs between the labs.

@@ -9,14 +9,14 @@ import type { WarningList } from '../kit/warnings';
 import { text } from '../texts';
 import type { LAB_IDS } from './address';
 import type { Captured, Handoff, OpenInLab } from './lab';
-import type { Opening, Source } from './opening';
+import type { AnyOpening, Source } from './opening';
 import type { Saving } from './saving';
 import type { NewSession, Session, SourceFile } from './session/file';
 import type { LabStates } from './states';
 import type { Work, WorkKind } from './work';
 
 /** A lab, as its sessions need it. */
-interface SessionLab {
+interface SessionLab<Example> {
   id: (typeof LAB_IDS)[number];
   ui: {
     banner: ErrorBanner;
@@ -27,11 +27,9 @@ interface SessionLab {
   };
   states: LabStates;
   work: Work;
-  // biome-ignore lint/suspicious/noExplicitAny: sessions do not look into links, data and models
-  opening: Opening<any, any, any, any>;
+  opening: AnyOpening<Example>;
   passOn: OpenInLab;
-  // biome-ignore lint/suspicious/noExplicitAny: as above
-  address: (source: Source<any, any, any>) => string;
+  address: (source: OpenSource<Example>) => string;
   content: () => Promise<Record<string, unknown> | undefined>;
   /** Called when a session was saved. */
   onSaved: () => void;
@@ -51,11 +49,11 @@ interface Described {
   data: File[];
 }
 
-type OpenSource = NonNullable<SessionLab['opening']['source']>;
+type OpenSource<Example> = Source<Example, unknown, unknown>;
 
 /** Saves a lab's sessions as files, and opens such files, in the right lab and with the right data. */
-export class Sessions {
-  readonly #lab: SessionLab;
+export class Sessions<Example extends { id: string }> {
+  readonly #lab: SessionLab<Example>;
   /** The session that waits until the user opens its data. */
   #waiting: Session | undefined;
   /** The data of the source that was captured last. */
@@ -63,7 +61,7 @@ export class Sessions {
   /** Kinds of unsaved work in sessions that bring a lab back. */
   readonly #kinds = new WeakMap<Session, readonly WorkKind[]>();
 
-  constructor(lab: SessionLab) {
+  constructor(lab: SessionLab<Example>) {
     this.#lab = lab;
   }
 
@@ -114,7 +112,7 @@ export class Sessions {
     if (source && states.canChange) await states.enqueue(() => this.#save(source, included));
   }
 
-  async #save(source: OpenSource, included: boolean): Promise<void> {
+  async #save(source: OpenSource<Example>, included: boolean): Promise<void> {
     const { opening, ui, states } = this.#lab;
     try {
       ui.status.say(text('sessions.saving'));
@@ -139,7 +137,7 @@ export class Sessions {
     return body && { ...body, ...kept, ...(warnings.length > 0 && { warnings }) };
   }
 
-  #sessionOf(source: OpenSource, files: SourceFile[], content: object): NewSession {
+  #sessionOf(source: OpenSource<Example>, files: SourceFile[], content: object): NewSession {
     const example: string | undefined = source.example?.id;
     const from = { name: source.name, files, ...(example !== undefined && { example }) };
     return { lab: this.#lab.id, hash: this.#lab.address(source), source: from, content };
@@ -163,7 +161,7 @@ export class Sessions {
   }
 
   /** Returns the data of a source, which are read once as long as it is open. */
-  async #describe(source: OpenSource): Promise<Described> {
+  async #describe(source: OpenSource<Example>): Promise<Described> {
     if (this.#described?.source === source) return this.#described;
     const named = this.#lab.opening.filesOf(await source.load());
     const files = await (await format()).describe(named, false);

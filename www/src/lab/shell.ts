@@ -8,7 +8,7 @@ import { plural, text } from '../texts';
 import { copyAddress, FILE_NOTE, showAddress } from './address';
 import type { Listed } from './example-panel';
 import type { Captured, Handoff, Lab, OpenInLab } from './lab';
-import type { Opening, Source } from './opening';
+import type { AnyOpening, Source } from './opening';
 import type { LabEvents, LabParts, RunEvents, RunParts } from './parts';
 import { Sessions } from './sessions';
 import type { LabStates } from './states';
@@ -61,14 +61,13 @@ export abstract class LabShell<Example extends Listed> implements Lab {
   /** Aborted when the lab is closed, which removes all event listeners. */
   protected readonly closing = new AbortController();
   readonly #help: HTMLElement;
-  #sessions: Sessions | undefined;
+  #sessions: Sessions<Example> | undefined;
 
   protected abstract readonly id: keyof typeof GUIDES;
   protected abstract readonly client: Engine;
   protected abstract readonly ui: LabParts<Example>;
   protected abstract readonly states: LabStates;
-  // biome-ignore lint/suspicious/noExplicitAny: the shell does not look into links, data and models
-  protected abstract readonly opening: Opening<Example, any, any, any>;
+  protected abstract readonly opening: AnyOpening<Example>;
 
   constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
     this.root = root;
