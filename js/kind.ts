@@ -13,6 +13,10 @@ export function mark(prototype: object, name: string, isRemote = false): void {
   Object.defineProperty(prototype, KIND, { value });
 }
 
+/** Returns whether a value is a proxy of an object in a worker. */
+export const isProxy = (value: unknown): boolean =>
+  (value as { [KIND]?: Kind } | null | undefined)?.[KIND]?.isRemote === true;
+
 /** Returns the error of a parameter that must be an object of a class, which says what it is instead, as far as it is known. */
 export function notA(name: 'Volume' | 'Mesh', parameter: string, value: unknown, orElse = ''): VesicleError {
   const kind = (value as { [KIND]?: Kind } | null | undefined)?.[KIND];

@@ -2,7 +2,7 @@
 import { choice, invalid } from '../check.js';
 import type { Space, Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
-import { notA } from '../kind.js';
+import { isProxy, notA } from '../kind.js';
 import type { MeshArrays, PositionOptions } from '../mesh.js';
 import type { Warning } from '../warning.js';
 
@@ -29,6 +29,24 @@ export interface MeshSource {
   copyTo?(out: MeshArrays, options?: PositionOptions): { vertices: number; triangles: number };
 }
 
+/** A changing surface in a worker that an adapter can show: a `Mesh` of `vesicle/worker`, or the `mesh` of a model there. */
+export interface RemoteMeshSource {
+  /** As that of a {@link MeshSource}. */
+  readonly topologyVersion: Promise<number>;
+  /** As that of a {@link MeshSource}. */
+  readonly geometryVersion: Promise<number>;
+  /** As those of a {@link MeshSource}. */
+  readonly warnings?: Promise<readonly Warning[]>;
+  /** Resolves with the surface in its present state, as that of a {@link MeshSource}. */
+  arrays(options?: PositionOptions): Promise<MeshArrays>;
+}
+
+/** Returns whether a surface is in a worker. */
+export function isRemote(mesh: MeshSource | RemoteMeshSource): mesh is RemoteMeshSource {
+  // Each property of a proxy that is read is a request.
+  return isProxy(mesh) || Object(mesh).topologyVersion instanceof Promise;
+}
+
 /**
  * A surface ready to be shown, in the world space of the host (NiiVue, three.js or vtk.js). The arrays are valid until
  * the next {@link MeshReader.read}.
@@ -48,7 +66,9 @@ export class MeshReader {
   readonly #rotated: boolean;
   readonly #remedy: string | undefined;
   #arrays: MeshArrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
-  #mesh: MeshSource | undefined;
+  #mesh: MeshSource | RemoteMeshSource | undefined;
+  /** Number of reads, so that a surface that arrives late does not replace a newer one. */
+  #reads = 0;
   #warnings: readonly Warning[] = [];
   #topology = 0;
   #geometry = 0;
@@ -72,11 +92,34 @@ export class MeshReader {
    */
   read(mesh: MeshSource): SurfaceArrays | undefined {
     checkSource(mesh);
+    this.#reads += 1;
     this.#warnings = mesh.warnings ?? [];
     const topology = mesh !== this.#mesh || mesh.topologyVersion !== this.#topology;
     if (!topology && mesh.geometryVersion === this.#geometry) return undefined;
     const frame = this.#takeOrAdvise(mesh);
     [this.#mesh, this.#topology, this.#geometry] = [mesh, mesh.topologyVersion, mesh.geometryVersion];
+    return this.#placed(frame, topology);
+  }
+
+  /** Does what {@link read} does, with a surface in a worker; undefined, too, if another one was read meanwhile. */
+  async fetch(mesh: RemoteMeshSource): Promise<SurfaceArrays | undefined> {
+    this.#reads += 1;
+    const own = this.#reads;
+    const [before, geometry, warnings] = await Promise.all([mesh.topologyVersion, mesh.geometryVersion, mesh.warnings]);
+    if (own !== this.#reads) return undefined;
+    this.#warnings = warnings ?? [];
+    if (mesh === this.#mesh && before === this.#topology && geometry === this.#geometry) return undefined;
+    const options = { relative: this.#remedy === undefined };
+    const arriving = Promise.all([mesh.arrays(options), mesh.topologyVersion]);
+    const [frame, after] = await arriving.catch((error) => this.#advise(error));
+    if (own !== this.#reads) return undefined;
+    const topology = mesh !== this.#mesh || before !== after || after !== this.#topology;
+    // Triangles that have changed between the two are read again the next time.
+    [this.#mesh, this.#topology, this.#geometry] = [mesh, before === after ? after : Number.NaN, geometry];
+    return this.#placed(frame, topology);
+  }
+
+  #placed(frame: MeshArrays, topology: boolean): SurfaceArrays {
     const origin: Vec3 = [...(frame.origin ?? ([0, 0, 0] as const))];
     if (this.#rotated) for (const values of [frame.positions, frame.normals, origin]) rotate180(values);
     return { ...frame, origin, topology };
@@ -91,10 +134,14 @@ export class MeshReader {
     try {
       return this.#take(mesh);
     } catch (error) {
-      const { code, message } = Object(error) as Partial<VesicleError>;
-      if (code !== 'precision' || !this.#remedy) throw error;
-      throw new VesicleError('precision', `${message?.split(': ')[0]}: ${this.#remedy}`);
+      return this.#advise(error);
     }
+  }
+
+  #advise(error: unknown): never {
+    const { code, message } = Object(error) as Partial<VesicleError>;
+    if (code !== 'precision' || !this.#remedy) throw error;
+    throw new VesicleError('precision', `${message?.split(': ')[0]}: ${this.#remedy}`);
   }
 
   #take(mesh: MeshSource): MeshArrays {
@@ -106,6 +153,7 @@ export class MeshReader {
 
   /** Forgets the mesh last read, so that the next read returns it in full. */
   clear(): void {
+    this.#reads += 1;
     this.#mesh = undefined;
     this.#warnings = [];
   }

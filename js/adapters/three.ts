@@ -9,9 +9,18 @@ import { choice, invalid } from '../check.js';
 import type { Space, Vec3, VolumeInit } from '../data.js';
 import type { MeshArrays } from '../mesh.js';
 import type { Warning } from '../warning.js';
-import { affineOf, bounds, MeshReader, type MeshSource, type SurfaceArrays, voxels } from './source.js';
+import {
+  affineOf,
+  bounds,
+  isRemote,
+  MeshReader,
+  type MeshSource,
+  type RemoteMeshSource,
+  type SurfaceArrays,
+  voxels,
+} from './source.js';
 
-export type { MeshSource } from './source.js';
+export type { MeshSource, RemoteMeshSource } from './source.js';
 
 /** The properties of a volume of three's `NRRDLoader` that {@link volumeFromThree} reads. */
 export interface ThreeVolume {
@@ -206,8 +215,15 @@ export class ThreeSurface {
    * @throws `VesicleError` `invalid-argument`: no mesh; `precision`: a mesh so far from the origin that single precision
    *   is too coarse there, and an object without a `position`.
    */
-  update(mesh: MeshSource): boolean {
-    const frame = this.#reader.read(mesh);
+  update(mesh: MeshSource): boolean;
+  /** The same for a mesh in a worker: resolves when it is there, with false, too, if a later call was there before. */
+  update(mesh: RemoteMeshSource): Promise<boolean>;
+  update(mesh: MeshSource | RemoteMeshSource): boolean | Promise<boolean> {
+    if (isRemote(mesh)) return this.#reader.fetch(mesh).then((frame) => this.#show(frame));
+    return this.#show(this.#reader.read(mesh));
+  }
+
+  #show(frame: SurfaceArrays | undefined): boolean {
     if (!frame) return false;
     this.#move(frame.origin);
     if (!this.#buffers?.fit(frame)) this.#grow(frame);

@@ -2,7 +2,14 @@
 import { invalid } from '../check.js';
 import type { Space } from '../data.js';
 import type { Warning } from '../warning.js';
-import { MeshReader, type MeshSource, polygons } from './source.js';
+import {
+  isRemote,
+  MeshReader,
+  type MeshSource,
+  polygons,
+  type RemoteMeshSource,
+  type SurfaceArrays,
+} from './source.js';
 
 interface DataArray {
   setData(values: Float32Array | Uint32Array, components?: number): void;
@@ -85,8 +92,15 @@ export class VtkSurface<P extends VtkPolyData> {
    * @throws `VesicleError` `invalid-argument`: no mesh; `precision`: a mesh so far from the origin that single precision
    *   is too coarse there, without an `actor`.
    */
-  update(mesh: MeshSource): boolean {
-    const frame = this.#reader.read(mesh);
+  update(mesh: MeshSource): boolean;
+  /** The same for a mesh in a worker: resolves when it is there, with false, too, if a later call was there before. */
+  update(mesh: RemoteMeshSource): Promise<boolean>;
+  update(mesh: MeshSource | RemoteMeshSource): boolean | Promise<boolean> {
+    if (isRemote(mesh)) return this.#reader.fetch(mesh).then((frame) => this.#show(frame));
+    return this.#show(this.#reader.read(mesh));
+  }
+
+  #show(frame: SurfaceArrays | undefined): boolean {
     if (!frame) return false;
     const moved = frame.origin.some((coordinate) => coordinate !== 0);
     if (moved || this.#moved) this.#actor?.setPosition(...frame.origin);
