@@ -249,7 +249,14 @@ describe('fill', () => {
   function opened() {
     const said: string[] = [];
     const nothing = () => undefined;
-    const lab = { onLabels: nothing, onVoxels: nothing, onUpdate: nothing, onBusy: nothing, onUndo: nothing };
+    const lab = {
+      onLabels: nothing,
+      onVoxels: nothing,
+      onUpdate: nothing,
+      onBusy: nothing,
+      onStopped: nothing,
+      onUndo: nothing,
+    };
     const client = { request: async () => ({ surfaces: [], milliseconds: 0, done: true }) };
     const editing = new SegmentEditing(client as never, {
       ...{ ...lab, onNothing: (reason) => said.push(reason) },

@@ -4,11 +4,24 @@ import { strFromU8, unzipSync } from 'three/addons/libs/fflate.module.js';
 import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from 'vitest';
 import init, { Mesh, Volume } from '../../pkg/index.js';
 import { labelTooth } from '../../www/src/labs/segment/labelling';
-import { type App, anotherPage, drop, openApp, overflow, reach, recordStates, unnamedControls } from './browser';
+import {
+  type App,
+  anotherPage,
+  drop,
+  openApp,
+  overflow,
+  reach,
+  recordStates,
+  unfold,
+  unnamedControls,
+} from './browser';
 import { LONG } from './long';
 import { dicomSeries } from './pictures';
 import { changes } from './pixels';
 import { ball } from './volumes';
+
+/** What the lab says when surfaces follow no further. */
+const STOPPED = 'Cancelled: the surfaces stay as they are until the next change.';
 
 /** Size of the ball's volume. */
 const SIZE = 32;
@@ -448,11 +461,16 @@ describe('files', () => {
   test('a volume that looks like a label map says so', async () => {
     for (const [name, bytes, note] of [
       ['boxes.nii', ballFile(boxes()), 'looks like a label map with 2 labels, and was opened as one'],
-      ['mask.nii', ballFile(boxes().map((label) => Math.min(label, 1))), 'looks like a mask'],
+      ['two.nii', ballFile(boxes().map((label) => Math.min(label, 1))), 'looks like a mask'],
     ] as const) {
       await opened(() => drop(app.page, [{ name, bytes }]));
       expect(await text('.facts')).toContain(note);
     }
+    // By its name, it is one.
+    await opened(() =>
+      drop(app.page, [{ name: 'mask.nii', bytes: ballFile(boxes().map((label) => Math.min(label, 1))) }]),
+    );
+    expect((await of(1)).voxels).toBe(boxes().filter((label) => label > 0).length);
   });
 
   for (const [format, options] of [
@@ -705,6 +723,26 @@ test('a crash of the worker loses no stroke', LONG, async () => {
     app.page = first;
     await page.close();
   }
+});
+
+test('what follows a change for long can be cancelled, and goes on after the next change', LONG, async () => {
+  const { page } = app;
+  await page.goto('about:blank');
+  // Merging the edges takes one step of many seconds, which only the end of the worker ends.
+  await page.goto(`${app.address}#segment?example=head&p.smoothing=200&p.edge=10`);
+  const cancel = page.locator('[data-action=cancel]');
+  await page.waitForSelector('[data-state=running]');
+  await cancel.click();
+  await expect.poll(() => page.textContent('.status')).toBe(STOPPED);
+  expect(await reach(page, 'done')).toBe('done');
+  expect(await cancel.isVisible()).toBe(false);
+  const before = await measured();
+  expect(before.labels.every(({ triangles }) => triangles > 0)).toBe(true);
+  await unfold(page);
+  await page.getByLabel('Edge length', { exact: true }).fill('1');
+  await page.keyboard.press('Enter');
+  await expect.poll(() => page.textContent('.status')).toMatch(/^Ready/);
+  expect((await measured()).labels[0]?.area).toBeLessThan(before.labels[0]?.area ?? 0);
 });
 
 test('settings are part of the link, and the page fits a phone', LONG, async () => {

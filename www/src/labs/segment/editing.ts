@@ -40,6 +40,8 @@ export interface EditedLab {
   onUpdate: (update: StepUpdate, smooth: boolean) => void;
   /** Called when the worker begins to follow changes. */
   onBusy: () => void;
+  /** Called when the surfaces follow no further, after {@link SegmentEditing.stop}. */
+  onStopped: () => void;
   /** Called when a fill has reached no voxel, with the reason. */
   onNothing: (reason: string) => void;
   onUndo: (undoable: string | undefined, redoable: string | undefined) => void;
@@ -65,6 +67,8 @@ export class SegmentEditing {
   /** Whether the worker has yet to smooth surfaces. */
   #isRough = false;
   #isFollowing = false;
+  /** Whether surfaces are to stay as they are until the next change. */
+  #isStopped = false;
   /** Settles when the worker has followed the changes so far. */
   #followed: Promise<void> = Promise.resolve();
   /** Number of the label map at the worker; replies about a previous one are discarded. */
@@ -113,7 +117,12 @@ export class SegmentEditing {
 
   /** Whether the worker has yet to follow changes. */
   get isBusy(): boolean {
-    return this.#isRough || this.#unsent !== undefined;
+    return (this.#isRough && !this.#isStopped) || this.#unsent !== undefined;
+  }
+
+  /** Has the surfaces stay as they are until the next change, once the worker has answered. */
+  stop(): void {
+    this.#isStopped = true;
   }
 
   /**
@@ -331,6 +340,7 @@ export class SegmentEditing {
   /** Has the worker adopt what has changed, and smooth the surfaces. */
   follow(): void {
     this.#isRough = true;
+    this.#isStopped = false;
     if (this.#isFollowing) return;
     this.#isFollowing = true;
     this.#lab.onBusy();
@@ -348,7 +358,7 @@ export class SegmentEditing {
    * that the next change never waits for long.
    */
   async #followChanges(map: number): Promise<void> {
-    while (this.#map && (this.#unsent || this.#isRough)) {
+    while (this.#map && this.isBusy) {
       const box = this.#unsent;
       this.#unsent = undefined;
       const update = box
@@ -359,6 +369,7 @@ export class SegmentEditing {
       this.#lab.onUpdate(update, !this.#isRough);
     }
     this.#isFollowing = false;
+    if (this.#isStopped) this.#lab.onStopped();
   }
 }
 

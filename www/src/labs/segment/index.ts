@@ -28,6 +28,9 @@ import { saveMap, saveSurfaces } from './saving';
 /** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
 const MASK_DELAY = 120;
 
+/** Milliseconds that a step may still take after *Cancel*, before the worker is ended. */
+const CANCEL_AFTER = 400;
+
 /** Milliseconds after which the surfaces are said to follow a change: mostly they have then. */
 const SAID_AFTER = 500;
 
@@ -58,6 +61,10 @@ export class SegmentLab extends LabShell<SegmentExample> {
   #maskRange: string | undefined;
   #maskTimer = 0;
   #busyTimer = 0;
+  /** Ends the worker if it does not answer after *Cancel*. */
+  #cancelTimer = 0;
+  /** Whether surfaces do not follow what was opened again, since that was cancelled. */
+  #isCancelled = false;
   /** Time in milliseconds at which the last stroke ended; undefined once its surfaces are drawn. */
   #released: number | undefined;
   /** Whether the last fill has reached no voxel. */
@@ -85,6 +92,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
         states.setModelState('running');
         this.#sayLater(text('segment.following'));
       },
+      onStopped: () => this.#stopped(),
       onNothing: (reason) => {
         this.#isUnfilled = true;
         this.#released = undefined;
@@ -97,6 +105,8 @@ export class SegmentLab extends LabShell<SegmentExample> {
       },
       onError: (title, error) => {
         clearTimeout(this.#busyTimer);
+        clearTimeout(this.#cancelTimer);
+        ui.offerCancel(false);
         states.fail(title, error);
       },
     });
@@ -111,6 +121,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   protected override closed(): void {
     clearTimeout(this.#maskTimer);
     clearTimeout(this.#busyTimer);
+    clearTimeout(this.#cancelTimer);
     delete this.root.dataset.tool;
   }
 
@@ -118,6 +129,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   #events(): PartEvents {
     return {
       ...this.labEvents(),
+      onCancel: () => this.#cancel(),
       onMapFiles: (files) => void this.#openLabels(files),
       onParam: (name, value) => void this.#setParam(name, value),
       onOptions: () => this.#optionsChanged(),
@@ -238,7 +250,29 @@ export class SegmentLab extends LabShell<SegmentExample> {
     this.#released = undefined;
     this.#latency = {};
     this.#show(opened);
-    this.#editing.follow();
+    if (this.#isCancelled) this.#stopped();
+    else this.#editing.follow();
+    this.#isCancelled = false;
+  }
+
+  /** Cancels the opening of data, or has the surfaces stay as they are until the next change. */
+  #cancel(): void {
+    if (this.states.value !== 'running') return void this.opening.cancel();
+    this.#editing.stop();
+    this.#cancelTimer = window.setTimeout(() => {
+      // A single step takes too long: the labels are opened again, in another worker.
+      this.#isCancelled = true;
+      this.states.load(text('labs.cancelling'));
+      void this.opening.cancel();
+    }, CANCEL_AFTER);
+  }
+
+  #stopped(): void {
+    clearTimeout(this.#busyTimer);
+    clearTimeout(this.#cancelTimer);
+    this.ui.offerCancel(false);
+    this.#showMeasures();
+    if (this.states.setModelState('done')) this.ui.status.say(text('segment.stopped'));
   }
 
   /** Shows surfaces that have followed a change; when they are smooth, the lab is done. */
@@ -256,7 +290,9 @@ export class SegmentLab extends LabShell<SegmentExample> {
   #sayLater(what: string): void {
     clearTimeout(this.#busyTimer);
     this.#busyTimer = window.setTimeout(() => {
-      if (this.states.value === 'running') this.ui.status.say(what);
+      if (this.states.value !== 'running') return;
+      this.ui.status.say(what);
+      this.ui.offerCancel(true);
     }, SAID_AFTER);
   }
 
@@ -264,6 +300,8 @@ export class SegmentLab extends LabShell<SegmentExample> {
   #settle(): void {
     if (this.#editing.isBusy) return;
     clearTimeout(this.#busyTimer);
+    clearTimeout(this.#cancelTimer);
+    this.ui.offerCancel(false);
     if (this.#released !== undefined) this.#latency = { ...this.#latency, smooth: performance.now() - this.#released };
     this.#released = undefined;
     this.#showMeasures();

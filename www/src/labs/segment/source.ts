@@ -109,7 +109,8 @@ async function readBoth(files: NamedBytes[]): Promise<Both> {
 function alone(image: NamedVolume): Both {
   if (image.known.length > 0) return { image, map: image, looksLike: 0 };
   const looksLike = labelsLike(image.init.data, 1);
-  // A mask may as well be an image of two intensities.
+  // Unless its name tells, a mask may as well be an image of two intensities.
+  if (looksLike === 1 && isNamed(image)) return { image, map: image, looksLike: 0 };
   return { image, map: looksLike > 1 ? image : undefined, looksLike };
 }
 
@@ -124,11 +125,13 @@ async function readMap(group: NamedBytes[]): Promise<NamedVolume> {
  * integers, or fewer different values.
  */
 function isMap(one: NamedVolume, other: NamedVolume): boolean {
-  const isNamed = ({ name, known }: NamedVolume) => known.length > 0 || /label|seg|mask|annot/i.test(name);
   if (isNamed(one) !== isNamed(other)) return isNamed(one);
   if (hasIntegers(one) !== hasIntegers(other)) return hasIntegers(one);
   return valuesIn(one) < valuesIn(other);
 }
+
+/** Whether a volume names its labels, or has the name of a label map. */
+const isNamed = ({ name, known }: NamedVolume) => known.length > 0 || /label|seg|mask|annot/i.test(name);
 
 const hasIntegers = ({ init: { data } }: NamedVolume) =>
   !(data instanceof Float32Array || data instanceof Float64Array) || data.every(Number.isInteger);
