@@ -48,7 +48,7 @@ async function show(mesh) {
 
 let volume, model, edited, working;
 
-/** Does work that *Cancel* aborts, and says what comes of it. */
+/** Does work that *Cancel* aborts, and shows the result. */
 async function work(what, doIt) {
   working = new AbortController();
   enable();
@@ -72,7 +72,7 @@ function enable() {
 const open = ([chosen]) =>
   work(`Opening ${chosen.name}.`, async () => {
     const opened = await Volume.parse(new Uint8Array(await chosen.arrayBuffer()));
-    // What is no longer needed is freed: the browser does not see memory of WebAssembly.
+    // Freed at once: the browser does not see memory of WebAssembly.
     for (const old of [volume, model, edited]) old?.free();
     [volume, model, edited] = [opened, undefined, undefined];
     const [low, high] = await volume.range;

@@ -20,8 +20,8 @@ import { dicomSeries } from './pictures';
 import { changes } from './pixels';
 import { ball } from './volumes';
 
-/** What the lab says when surfaces follow no further. */
-const STOPPED = 'Cancelled: the surfaces stay as they are until the next change.';
+/** The status when surfaces follow no further. */
+const STOPPED = 'Cancelled: the surfaces remain unchanged until the next change.';
 
 /** Size of the ball's volume. */
 const SIZE = 32;

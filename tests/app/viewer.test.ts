@@ -97,7 +97,7 @@ test('a file that is no volume is refused in words', async () => {
     .locator('#file')
     .setInputFiles({ name: 'notes.txt', mimeType: 'text/plain', buffer: Buffer.from('no volume') });
   await expect.poll(status).toMatch(/not|no /);
-  // What was open stays.
+  // The volume before stays open.
   await press('Run');
   await expect.poll(status).toMatch(/^\d+ triangles/);
 });

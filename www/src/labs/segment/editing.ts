@@ -67,7 +67,7 @@ export class SegmentEditing {
   /** Whether the worker has yet to smooth surfaces. */
   #isRough = false;
   #isFollowing = false;
-  /** Whether surfaces are to stay as they are until the next change. */
+  /** Whether surfaces are to remain unchanged until the next change. */
   #isStopped = false;
   /** Settles when the worker has followed the changes so far. */
   #followed: Promise<void> = Promise.resolve();
@@ -120,7 +120,7 @@ export class SegmentEditing {
     return (this.#isRough && !this.#isStopped) || this.#unsent !== undefined;
   }
 
-  /** Has the surfaces stay as they are until the next change, once the worker has answered. */
+  /** Has the surfaces remain unchanged until the next change, once the worker has answered. */
   stop(): void {
     this.#isStopped = true;
   }

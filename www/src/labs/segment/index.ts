@@ -255,7 +255,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
     this.#isCancelled = false;
   }
 
-  /** Cancels the opening of data, or has the surfaces stay as they are until the next change. */
+  /** Cancels the opening of data, or has the surfaces remain unchanged until the next change. */
   #cancel(): void {
     if (this.states.value !== 'running') return void this.opening.cancel();
     this.#editing.stop();
