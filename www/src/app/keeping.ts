@@ -25,6 +25,8 @@ interface Open {
   isBack: boolean;
   /** Whether there was work in it, since it was opened or before. */
   hadWork: boolean;
+  /** Whether another lab is about to take its place. */
+  isLeft: boolean;
   /** Number of changes, and of those that the page and the browser keep. */
   changes: number;
   kept: number;
@@ -79,7 +81,7 @@ export class Keeping {
   /** Follows a lab that was opened; `from` is the id of what it was brought back from. */
   follow(kind: string, lab: Lab, from?: string): void {
     const open: Open = {
-      ...{ lab, kind, id: newName(), from, isBack: false, hadWork: false },
+      ...{ lab, kind, id: newName(), from, isBack: false, hadWork: false, isLeft: false },
       ...{ changes: 0, kept: -1, stored: -1, timer: 0 },
     };
     this.#open = open;
@@ -130,12 +132,14 @@ export class Keeping {
     if (open.from && !open.hadWork) return true;
     if (open.lab.isPlain) await this.giveUp();
     else await this.#keep(open).catch(() => undefined);
-    return open.kept === open.changes || open.lab.work.kinds.length === 0;
+    open.isLeft = open.kept === open.changes || open.lab.work.kinds.length === 0;
+    return open.isLeft;
   }
 
   /** Forgets the open lab, since nothing in it is to be kept. */
   async giveUp(): Promise<void> {
     if (!this.#open) return;
+    this.#open.isLeft = true;
     this.#kept.delete(this.#open.kind);
     await this.#forget(this.#open);
   }
@@ -161,6 +165,7 @@ export class Keeping {
   }
 
   async #keepInTime(open: Open): Promise<void> {
+    if (open.isLeft) return;
     const start = performance.now();
     const hasWork = () => open.lab.work.kinds.length > 0;
     if (hasWork()) await this.#keep(open).catch((error) => this.onFailure(error));
