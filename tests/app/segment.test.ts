@@ -745,6 +745,27 @@ test('what follows a change for long can be cancelled, and goes on after the nex
   expect((await measured()).labels[0]?.area).toBeLessThan(before.labels[0]?.area ?? 0);
 });
 
+test('a step that does not end is cancelled with its worker, and the labels are there', LONG, async () => {
+  const page = await anotherPage(app, () => {
+    let isFirst = true;
+    window.Worker = class extends Worker {
+      readonly #isStuck = isFirst;
+      override postMessage(message: { kind?: string }, ...more: never[]): void {
+        isFirst = false;
+        if (!this.#isStuck || message?.kind !== 'step') super.postMessage(message, ...more);
+      }
+    };
+  });
+  await page.goto(`${app.address}#segment?example=tooth`);
+  await page.waitForSelector('[data-state=running]');
+  await page.locator('[data-action=cancel]').click();
+  await expect.poll(() => page.textContent('.status')).toBe(STOPPED);
+  expect(await page.getAttribute('#lab', 'data-state')).toBe('done');
+  const { labels } = JSON.parse((await page.getAttribute('[data-measures]', 'data-measures')) ?? '{}');
+  expect(labels.map(({ voxels }: Measured) => voxels > 0)).toEqual([true, true, true]);
+  await page.close();
+});
+
 test('settings are part of the link, and the page fits a phone', LONG, async () => {
   await openAt('#segment?example=ovule&opacity=0.8&slices=hidden&p.smoothing=5');
   expect(await app.page.inputValue('[data-view=opacity]')).toBe('0.8');

@@ -263,7 +263,9 @@ export class SegmentLab extends LabShell<SegmentExample> {
       // A single step takes too long: the labels are opened again, in another worker.
       this.#isCancelled = true;
       this.states.load(text('labs.cancelling'));
-      void this.opening.cancel();
+      void this.opening.cancel().then(() => {
+        if (this.states.value === 'done') this.ui.status.say(text('segment.stopped'));
+      });
     }, CANCEL_AFTER);
   }
 
@@ -272,7 +274,8 @@ export class SegmentLab extends LabShell<SegmentExample> {
     clearTimeout(this.#cancelTimer);
     this.ui.offerCancel(false);
     this.#showMeasures();
-    if (this.states.setModelState('done')) this.ui.status.say(text('segment.stopped'));
+    const { value } = this.states;
+    if (value === 'running' || value === 'loading') this.states.idle(text('segment.stopped'), 'done');
   }
 
   /** Shows surfaces that have followed a change; when they are smooth, the lab is done. */
