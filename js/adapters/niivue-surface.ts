@@ -5,7 +5,7 @@ import { VesicleError } from '../error.js';
 import type { MeshArrays } from '../mesh.js';
 import type { Warning } from '../warning.js';
 import { Outline, type Outlines, outlinesOf } from './niivue-outline.js';
-import { bounds, isRemote, MeshReader, type MeshSource, type RemoteMeshSource, type SurfaceArrays } from './source.js';
+import { bounds, MeshReader, type MeshSource, type RemoteMeshSource, type SurfaceArrays } from './source.js';
 
 /** The members of NiiVue's class `Niivue` (`NiiVueGPU` in 1.0) that {@link NiivueSurface} uses. */
 export interface Niivue {
@@ -115,14 +115,15 @@ export class NiivueSurface {
    * Updates NiiVue's mesh if `mesh` has changed since the last call; draw to show it. Resolves with whether `mesh` had
    * changed.
    *
-   * Unless `mesh` is in a worker, the work is done synchronously and the promise resolves at once, except in 1.0 on the first call, and with WebGPU
-   * possibly on each: there NiiVue uploads its volumes again, too.
+   * Unless `mesh` is in a worker, the work is done synchronously and the promise resolves at once, except in 1.0 on the
+   * first call, and with WebGPU possibly on each: there NiiVue uploads its volumes again, too.
    *
    * @throws `VesicleError` `invalid-argument`: no mesh; `precision`: a mesh so far from the origin that single precision
    *   is too coarse there, unless it may be recentred and NiiVue has no volume as far away. What was shown stays.
    */
   async update(mesh: MeshSource | RemoteMeshSource): Promise<boolean> {
-    const frame = isRemote(mesh) ? await this.#reader.fetch(mesh) : this.#reader.read(mesh);
+    const read = this.#reader.readOrFetch(mesh);
+    const frame = read instanceof Promise ? await read : read;
     if (!frame) return false;
     await this.#moveTo(frame.origin);
     // NiiVue keeps the arrays for later use, so they are copied.

@@ -42,7 +42,7 @@ export interface RemoteMeshSource {
 }
 
 /** Returns whether a surface is in a worker. */
-export function isRemote(mesh: MeshSource | RemoteMeshSource): mesh is RemoteMeshSource {
+function isRemote(mesh: MeshSource | RemoteMeshSource): mesh is RemoteMeshSource {
   // Each property of a proxy that is read is a request.
   return isProxy(mesh) || Object(mesh).topologyVersion instanceof Promise;
 }
@@ -86,6 +86,21 @@ export class MeshReader {
     this.#rotated = spaces[0] !== spaces.at(-1);
   }
 
+  /** Has `show` show a mesh, here or in a worker, if it has changed since the last read; returns whether it had. */
+  update(mesh: MeshSource | RemoteMeshSource, show: (frame: SurfaceArrays) => void): boolean | Promise<boolean> {
+    const shown = (frame: SurfaceArrays | undefined) => {
+      if (frame) show(frame);
+      return frame !== undefined;
+    };
+    const frame = this.readOrFetch(mesh);
+    return frame instanceof Promise ? frame.then(shown) : shown(frame);
+  }
+
+  /** Does what {@link read} does; with a surface in a worker, a promise of it. */
+  readOrFetch(mesh: MeshSource | RemoteMeshSource): SurfaceArrays | undefined | Promise<SurfaceArrays | undefined> {
+    return isRemote(mesh) ? this.#fetch(mesh) : this.read(mesh);
+  }
+
   /**
    * Returns the surface in the host's space, or undefined if it has not changed since the last read; throws `precision`
    * with the remedy if single precision in world space does not suffice.
@@ -102,15 +117,14 @@ export class MeshReader {
   }
 
   /** Does what {@link read} does, with a surface in a worker; undefined, too, if another one was read meanwhile. */
-  async fetch(mesh: RemoteMeshSource): Promise<SurfaceArrays | undefined> {
+  async #fetch(mesh: RemoteMeshSource): Promise<SurfaceArrays | undefined> {
     this.#reads += 1;
     const own = this.#reads;
     const [before, geometry, warnings] = await Promise.all([mesh.topologyVersion, mesh.geometryVersion, mesh.warnings]);
     if (own !== this.#reads) return undefined;
     this.#warnings = warnings ?? [];
     if (mesh === this.#mesh && before === this.#topology && geometry === this.#geometry) return undefined;
-    const options = { relative: this.#remedy === undefined };
-    const arriving = Promise.all([mesh.arrays(options), mesh.topologyVersion]);
+    const arriving = Promise.all([mesh.arrays(this.#options), mesh.topologyVersion]);
     const [frame, after] = await arriving.catch((error) => this.#advise(error));
     if (own !== this.#reads) return undefined;
     const topology = mesh !== this.#mesh || before !== after || after !== this.#topology;
@@ -144,10 +158,13 @@ export class MeshReader {
     throw new VesicleError('precision', `${message?.split(': ')[0]}: ${this.#remedy}`);
   }
 
+  get #options(): PositionOptions {
+    return { relative: this.#remedy === undefined };
+  }
+
   #take(mesh: MeshSource): MeshArrays {
-    const options = { relative: this.#remedy === undefined };
-    if (!mesh.copyTo) return copied(mesh.arrays(options));
-    const { vertices, triangles } = mesh.copyTo(this.#arrays, options);
+    if (!mesh.copyTo) return copied(mesh.arrays(this.#options));
+    const { vertices, triangles } = mesh.copyTo(this.#arrays, this.#options);
     return usedPart(this.#arrays, vertices, triangles);
   }
 

@@ -12,7 +12,6 @@ import type { Warning } from '../warning.js';
 import {
   affineOf,
   bounds,
-  isRemote,
   MeshReader,
   type MeshSource,
   type RemoteMeshSource,
@@ -219,16 +218,13 @@ export class ThreeSurface {
   /** The same for a mesh in a worker: resolves when it is there, with false, too, if a later call was there before. */
   update(mesh: RemoteMeshSource): Promise<boolean>;
   update(mesh: MeshSource | RemoteMeshSource): boolean | Promise<boolean> {
-    if (isRemote(mesh)) return this.#reader.fetch(mesh).then((frame) => this.#show(frame));
-    return this.#show(this.#reader.read(mesh));
+    return this.#reader.update(mesh, (frame) => this.#show(frame));
   }
 
-  #show(frame: SurfaceArrays | undefined): boolean {
-    if (!frame) return false;
+  #show(frame: SurfaceArrays): void {
     this.#move(frame.origin);
     if (!this.#buffers?.fit(frame)) this.#grow(frame);
     this.#buffers?.write(frame);
-    return true;
   }
 
   // A mesh near the origin has none of its own; then the position is the caller's.

@@ -2,14 +2,7 @@
 import { invalid } from '../check.js';
 import type { Space } from '../data.js';
 import type { Warning } from '../warning.js';
-import {
-  isRemote,
-  MeshReader,
-  type MeshSource,
-  polygons,
-  type RemoteMeshSource,
-  type SurfaceArrays,
-} from './source.js';
+import { MeshReader, type MeshSource, polygons, type RemoteMeshSource, type SurfaceArrays } from './source.js';
 
 interface DataArray {
   setData(values: Float32Array | Uint32Array, components?: number): void;
@@ -96,12 +89,10 @@ export class VtkSurface<P extends VtkPolyData> {
   /** The same for a mesh in a worker: resolves when it is there, with false, too, if a later call was there before. */
   update(mesh: RemoteMeshSource): Promise<boolean>;
   update(mesh: MeshSource | RemoteMeshSource): boolean | Promise<boolean> {
-    if (isRemote(mesh)) return this.#reader.fetch(mesh).then((frame) => this.#show(frame));
-    return this.#show(this.#reader.read(mesh));
+    return this.#reader.update(mesh, (frame) => this.#show(frame));
   }
 
-  #show(frame: SurfaceArrays | undefined): boolean {
-    if (!frame) return false;
+  #show(frame: SurfaceArrays): void {
     const moved = frame.origin.some((coordinate) => coordinate !== 0);
     if (moved || this.#moved) this.#actor?.setPosition(...frame.origin);
     this.#moved = moved;
@@ -110,7 +101,6 @@ export class VtkSurface<P extends VtkPolyData> {
     this.#normals.setData(frame.normals.slice(), 3);
     if (frame.topology) this.polyData.getPolys().setData(polygons(frame));
     this.polyData.modified();
-    return true;
   }
 
   /** Deletes the poly data; remove its actor from the view first. */

@@ -120,7 +120,7 @@ test(
   },
 );
 
-test('a lab that cannot be kept, since its engine has failed, asks before it is left', LONG, async () => {
+test('a lab whose engine has failed asks before it is left, since its labels cannot be kept', LONG, async () => {
   const own = page;
   page = await breakable(QUICK.segment);
   await paint();

@@ -51,7 +51,7 @@ export interface Lab {
   onChange: () => void;
   /** Called when the user asks what is kept of unsaved work. */
   onShowKept: () => void;
-  /** Returns the lab as it is; undefined if that cannot be saved now. */
+  /** Returns what brings the lab back as it is; undefined if its model cannot be saved at the moment. */
   capture(): Promise<Captured | undefined>;
   start(passedOn?: Handoff): Promise<void>;
   /** Releases the worker, GPU memory and event listeners. */

@@ -149,6 +149,8 @@ export class Sessions<Example extends { id: string }> {
     const { source } = opening;
     if (!source || !states.canChange) return undefined;
     const [{ writeSession }, { files, data }] = await Promise.all([format(), this.#describe(source)]);
+    // There is no way to open again what the app has made, if it is too large to be captured.
+    if (source.isMade && data.length < files.length) return undefined;
     const { kinds } = work;
     const made = await states.inTurn(async () => {
       if (opening.source !== source || !states.canChange) return undefined;
