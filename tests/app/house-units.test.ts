@@ -68,3 +68,20 @@ test('imports lead downwards', () => {
   expect(arrows.length).toBeGreaterThan(1000);
   expect(against).toEqual([]);
 });
+
+test('no class extends another of the app', () => {
+  const found = files.flatMap((path) => {
+    const classes: string[] = [];
+    const visit = (node: ts.Node) => {
+      const base =
+        ts.isClassLike(node) && node.heritageClauses?.find((one) => one.token === ts.SyntaxKind.ExtendsKeyword);
+      if (base) classes.push(`${path}: ${base.types[0]?.expression.getText()}`);
+      ts.forEachChild(node, visit);
+    };
+    visit(ts.createSourceFile(path, readFileSync(join(SRC, path), 'utf8'), ts.ScriptTarget.Latest, true));
+    return classes;
+  });
+  expect(found.filter((one) => !/: (Error|HTMLElement)$/.test(one))).toEqual([]);
+  // Errors are found, so that others would be.
+  expect(found.length).toBeGreaterThan(0);
+});

@@ -1,7 +1,7 @@
 /** Opening data in a lab: what is open after something could be opened in part only. */
 import { expect, test } from 'vitest';
 import { RequestError } from '../../www/src/engine/channel';
-import { Opening, type Source } from '../../www/src/lab/opening';
+import { type LabData, Opening, type Source } from '../../www/src/lab/opening';
 import type { Session } from '../../www/src/lab/session/file';
 import { LabStates } from '../../www/src/lab/states';
 
@@ -29,9 +29,9 @@ class Page {
   );
 }
 
-/** A lab that shows the names of its data, and fails in the middle of those with an error in `faults`. */
-class NameOpening extends Opening<Example, Linked, string, string> {
-  protected readonly first = { id: 'first' };
+/** Data that are their own names; the lab fails in the middle of showing those with an error in `faults`. */
+class Names implements LabData<Example, Linked, string, string> {
+  readonly first = { id: 'first' };
   readonly faults = new Map<string, Error>();
   /** Why data, by their names, are not loaded. */
   readonly unread = new Map<string, Error>();
@@ -40,32 +40,24 @@ class NameOpening extends Opening<Example, Linked, string, string> {
   readonly #page: Page;
 
   constructor(page: Page) {
-    const engine = {
-      restart: () => {
-        page.restarts += 1;
-      },
-      request: async () => ({ specs: [] }),
-    };
-    const ui = { makeParams: () => undefined, banner: page.banner, status: { say: () => undefined } };
-    super(engine, { ...ui, data: { choose: () => undefined } } as never, page.states);
     this.#page = page;
   }
 
-  protected find = (id: string) => ({ id });
-  protected linkedBy = () => undefined;
-  protected fromExample = (example: Example) => ({ name: example.id, load: async () => example.id, example });
-  protected fromFiles = ([file]: File[]) => {
+  find = (id: string) => ({ id });
+  linkedBy = () => undefined;
+  fromExample = (example: Example) => ({ name: example.id, load: async () => example.id, example });
+  fromFiles = ([file]: File[]) => {
     const name = file?.name ?? '';
     const load = () => (name === 'slow' ? new Promise<string>(() => undefined) : Promise.resolve(name));
     return { name, load, isKept: name !== 'not kept' };
   };
-  protected load = async (_: AnySource, data: string) => {
+  load = async (_: AnySource, data: string) => {
     const fault = this.unread.get(data);
     if (fault) throw fault;
     return data;
   };
-  protected override voxelsOf = () => this.voxels;
-  protected async adopt(opened: string, source: AnySource): Promise<void> {
+  voxelsOf = () => this.voxels;
+  async adopt(opened: string, source: AnySource): Promise<void> {
     this.#page.states.ready = true;
     this.#page.shown = `half ${opened}`;
     const fault = source.session && this.faults.get(source.session.source.name);
@@ -73,6 +65,22 @@ class NameOpening extends Opening<Example, Linked, string, string> {
     this.#page.shown = opened;
     this.#page.states.idle('');
   }
+}
+
+/** A lab whose data are names. */
+function nameLab(page: Page) {
+  const engine = {
+    restart: () => {
+      page.restarts += 1;
+    },
+    request: async () => ({ specs: [] }),
+  };
+  const ui = { makeParams: () => undefined, banner: page.banner, status: { say: () => undefined } };
+  const data = new Names(page);
+  return {
+    data,
+    opening: new Opening(engine, { ...ui, data: { choose: () => undefined } } as never, page.states, data),
+  };
 }
 
 const named = (name: string, example: string) => ({ source: { name, example, files: [] } }) as unknown as Session;
@@ -85,8 +93,8 @@ test.each([
   'after a session that %s cannot show, what was open before is open, and other files open',
   async (_, fault, restarts) => {
     const page = new Page();
-    const opening = new NameOpening(page);
-    opening.faults.set('bad', fault);
+    const { opening, data } = nameLab(page);
+    data.faults.set('bad', fault);
     await opening.files(files);
     await opening.session(named('bad', 'other'), []);
     expect(page).toMatchObject({ shown: 'mine', message: `bad could not be opened. ${fault.message}`, restarts });
@@ -101,8 +109,8 @@ test.each([
 
 test('after a session that cannot be shown in a lab with nothing open, the first example opens', async () => {
   const page = new Page();
-  const opening = new NameOpening(page);
-  opening.faults.set('bad', new Error('no'));
+  const { opening, data } = nameLab(page);
+  data.faults.set('bad', new Error('no'));
   await opening.session(named('bad', 'other'), []);
   expect(page.shown).toBe('first');
   expect(page.message).toContain('bad could not be opened');
@@ -112,7 +120,7 @@ test('the first data can be cancelled from the beginning, unless there is nothin
   const page = new Page();
   const offers: boolean[] = [];
   page.states.subscribeCancellable((isCancellable) => offers.push(isCancellable));
-  const opening = new NameOpening(page);
+  const { opening } = nameLab(page);
   const first = opening.default();
   expect(offers).toEqual([false]);
   void opening.files([new File([], 'slow')]);
@@ -125,9 +133,9 @@ test('the first data can be cancelled from the beginning, unless there is nothin
 
 test('what is open gives back its memory before other data are read, and is opened again if they cannot be', async () => {
   const page = new Page();
-  const opening = new NameOpening(page);
-  opening.unread.set('bad', new RequestError({ code: 'bad-file', message: 'no image' }));
-  opening.voxels = 2 ** 25;
+  const { opening, data } = nameLab(page);
+  data.unread.set('bad', new RequestError({ code: 'bad-file', message: 'no image' }));
+  data.voxels = 2 ** 25;
   await opening.files(files);
   expect(page.restarts).toBe(0);
   await opening.files([new File([], 'other')]);
@@ -142,8 +150,8 @@ test.each([
   ['data that are not kept, and may be gone', 'not kept', 2 ** 25],
 ])('%s stay in the engine until others are open', async (_, name, voxels) => {
   const page = new Page();
-  const opening = new NameOpening(page);
-  opening.voxels = voxels;
+  const { opening, data } = nameLab(page);
+  data.voxels = voxels;
   await opening.files([new File([], name)]);
   await opening.files([new File([], 'other')]);
   expect(page).toMatchObject({ shown: 'other', restarts: 0 });

@@ -119,9 +119,9 @@ export class Labs {
     try {
       // The engine loads in parallel with the lab's own code.
       preloadWorker(kind.spawn);
-      const Kind = await kind.load();
+      const make = await kind.load();
       if (turn !== this.#turn) return;
-      this.#lab = new Kind(this.#root, this.#help, (passedOn) => this.#passOn(passedOn));
+      this.#lab = make({ root: this.#root, help: this.#help, passOn: (passedOn) => this.#passOn(passedOn) });
       this.#keeping.follow(kind.id, this.#lab, kept?.id);
       this.#help.toggleAttribute('disabled', false);
       void this.#lab.start(passedOn ?? (kept && asHandoff(kind, kept)));

@@ -75,8 +75,15 @@ async function released(lock: string): Promise<void> {
   await navigator.locks?.request(lock, { signal }, () => undefined).catch(() => undefined);
 }
 
-/** The page's connection to a lab's worker: requests return promises, events go to one listener. */
-export class Channel<Requests extends RequestTable<Requests>, Event extends { event: string }> {
+/**
+ * The page's connection to a lab's worker: requests return promises, events go to one listener, and a `Message` has no
+ * reply.
+ */
+export class Channel<
+  Requests extends RequestTable<Requests>,
+  Event extends { event: string },
+  Message extends { kind: string } = never,
+> {
   readonly #spawn: () => Worker;
   readonly #onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void;
   readonly #pending = new Map<number, PendingRequest>();
@@ -106,12 +113,16 @@ export class Channel<Requests extends RequestTable<Requests>, Event extends { ev
     const id = ++this.#lastId;
     return new Promise((resolve, reject) => {
       this.#pending.set(id, { resolve, reject });
-      this.post({ id, kind, body } as { kind: string }, transfer);
+      this.#send({ id, kind, body }, transfer);
     });
   }
 
   /** Posts a message that has no reply to the worker. */
-  protected post(message: { kind: string }, transfer: Transferable[] = []): void {
+  post(message: Message, transfer: Transferable[] = []): void {
+    this.#send(message, transfer);
+  }
+
+  #send(message: object, transfer: Transferable[]): void {
     if (this.#worker) this.#worker.postMessage(message, transfer);
     else this.#unsent.push([message, transfer]);
   }

@@ -4,8 +4,7 @@ import type { Requests } from './protocol';
 const spawn = () => new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle edits' });
 
 /** The page's connection to the worker that edits and compares surfaces; all labs have the same. */
-export class FinishClient extends Channel<Requests, never> {
-  constructor(onFailure: () => void) {
-    super(spawn, onFailure);
-  }
-}
+export type FinishClient = Channel<Requests, never>;
+
+/** Connects to that worker. */
+export const connectFinish = (onFailure: () => void): FinishClient => new Channel(spawn, onFailure);

@@ -1,7 +1,7 @@
 import { RequestError } from '../engine/channel';
 import type { ExportRequest } from '../engine/protocol';
 import { text } from '../texts';
-import { FinishClient } from './client';
+import { connectFinish, type FinishClient } from './client';
 import type { Edited, RequestKind, Requests } from './protocol';
 
 /** Code of the error that cancelled requests are rejected with. */
@@ -120,7 +120,7 @@ export class Finishing {
   async #open(): Promise<void> {
     const surface = this.#surface;
     const bytes = await this.#mesh();
-    this.#client ??= new FinishClient(() => this.#lose());
+    this.#client ??= connectFinish(() => this.#lose());
     const edited = await this.#client.request('open', bytes);
     // Forgotten while it was being opened.
     if (surface !== this.#surface) return;
@@ -147,7 +147,7 @@ export class Finishing {
 
   #startAgain(): void {
     this.#isRepeating = true;
-    const client = new FinishClient(() => this.#lose());
+    const client = connectFinish(() => this.#lose());
     this.#client = client;
     const done = () => {
       this.#isRepeating = false;

@@ -9,7 +9,7 @@ import type { FileNotes } from '../engine/protocol';
 import { areSmall } from '../engine/small-files';
 import { hasName, setName } from '../kit/folders';
 import { text } from '../texts';
-import { ImportClient } from './client';
+import { connectImport } from './client';
 import type { Candidate, Listing } from './protocol';
 import { HEAD, isDicom, isTiff } from './recognise';
 import { isNamedSession } from './sessions';
@@ -87,7 +87,7 @@ function nativeCandidate(name: string, id: number): Candidate {
 
 async function imported(files: File[], foreign: File[], admission: Admission): Promise<File[] | undefined> {
   const choice = new VolumeChoice(text('importing.severalVolumes'));
-  const client = new ImportClient((progress) => choice.progress(progress));
+  const client = connectImport((progress) => choice.progress(progress));
   try {
     // Files that are none of a series may be its damaged slices.
     const listing = await choice.during(client.request('list', { files: foreign.length > 1 ? files : foreign }));

@@ -72,13 +72,30 @@ export class OptionControls<Options extends object> {
     this.#onChange({ ...this.#value });
   }
 
-  /** Returns the control of an option, with its label. */
-  protected elementOf(name: keyof Options): HTMLElement | undefined {
-    return this.#controls.get(name)?.parentElement ?? undefined;
+  /** Places an element before the control of an option. */
+  place(element: HTMLElement, before: keyof Options): void {
+    this.#controls.get(before)?.parentElement?.before(element);
   }
 
-  /** Returns an entry of an option's selection list. */
-  protected entryOf(name: keyof Options, value: string): HTMLOptionElement | null | undefined {
+  /** Hides the control of an option, or shows it. */
+  hide(name: keyof Options, isHidden: boolean): void {
+    const element = this.#controls.get(name)?.parentElement;
+    if (element) element.hidden = isHidden;
+  }
+
+  /** Hides an entry of an option's selection list, or shows it. */
+  hideEntry(name: keyof Options, value: string, isHidden: boolean): void {
+    const entry = this.#entry(name, value);
+    if (entry) entry.hidden = isHidden;
+  }
+
+  /** Disables an entry of an option's selection list, or enables it. */
+  disableEntry(name: keyof Options, value: string, isDisabled: boolean): void {
+    const entry = this.#entry(name, value);
+    if (entry) entry.disabled = isDisabled;
+  }
+
+  #entry(name: keyof Options, value: string): HTMLOptionElement | null | undefined {
     return this.#controls.get(name)?.querySelector<HTMLOptionElement>(`[value="${value}"]`);
   }
 

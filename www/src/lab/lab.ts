@@ -61,6 +61,13 @@ export interface Lab {
 /** Function by which a lab opens another lab with data that it passes on. */
 export type OpenInLab = (passedOn: Handoff) => void;
 
+/** Where a lab is: its element, that of its help, and the way to other labs. */
+export interface LabPlace {
+  root: HTMLElement;
+  help: HTMLElement;
+  passOn: OpenInLab;
+}
+
 /** A lab as the page lists it, before its code is loaded. */
 export interface LabKind {
   /** The lab's name in addresses, after the #. */
@@ -71,6 +78,6 @@ export interface LabKind {
   guide: string;
   /** Starts the lab's worker. */
   spawn: () => Worker;
-  /** Loads the lab's code; returns the lab's class. */
-  load: () => Promise<new (root: HTMLElement, help: HTMLElement, passOn: OpenInLab) => Lab>;
+  /** Loads the lab's code; returns the function that makes the lab. */
+  load: () => Promise<(place: LabPlace) => Lab>;
 }

@@ -77,14 +77,85 @@ export interface AnyOpening<Example> {
   cancel(): Promise<void>;
 }
 
+/** Circumstances in which data are loaded. */
+export interface Loading<Example, Linked, Data> {
+  /** Whether the same source was open before, and the engine was restarted. */
+  reopening: boolean;
+  /** The source that is open as yet; undefined if there is none. */
+  present: Source<Example, Linked, Data> | undefined;
+}
+
+/** The data of a lab: which there are, and how its worker builds a model of them. */
+export interface LabData<Example, Linked, Data, Opened> {
+  /** The example that opens by default. */
+  readonly first: Example;
+
+  /** Returns the example with this id, undefined if there is none. */
+  find(id: string): Example | undefined;
+
+  /** Parses the hash of an address; undefined if it contains no settings for this lab. */
+  linkedBy(hash: string): Linked | undefined;
+
+  /** Returns all that is needed to open an example, without downloading it yet. */
+  fromExample(example: Example): Source<Example, Linked, Data>;
+
+  /** Returns all that is needed to open the user's files, without reading them yet. */
+  fromFiles(files: File[]): Source<Example, Linked, Data>;
+
+  /** Returns all that is needed to open what another lab passes on; without it, the first example opens in its place. */
+  fromHandoff?(handoff: Handoff): Source<Example, Linked, Data>;
+
+  /** Returns the files among the data, which sessions describe or include; without it, there are none. */
+  filesOf?(data: Data): NamedBytes[];
+
+  /** Has the worker build a model of the data. */
+  load(source: Source<Example, Linked, Data>, data: Data, loading: Loading<Example, Linked, Data>): Promise<Opened>;
+
+  /**
+   * Displays what was opened, with the settings of its example or link, and runs it; with `reopening`, with the
+   * previous settings.
+   */
+  adopt(opened: Opened, source: Source<Example, Linked, Data>, reopening: boolean): Promise<void>;
+
+  /** Returns the source to open again after a failure of the engine; without it, the one that was opened. */
+  sourceToRemember?(
+    source: Source<Example, Linked, Data>,
+    opened: Opened,
+    data: Data,
+    present: Source<Example, Linked, Data> | undefined,
+  ): Source<Example, Linked, Data>;
+
+  /** Returns the number of voxels of what was opened; without it, 0. */
+  voxelsOf?(opened: Opened): number;
+
+  /** Has the worker save the present model, so that undo or a restarted engine can restore it. */
+  save?(): void;
+
+  /** Returns a promise that settles when all pending saves of the model are complete. */
+  saved?(): Promise<unknown>;
+
+  /** Called when opening has failed, and what was open before stays. */
+  kept?(present: Source<Example, Linked, Data> | undefined): void;
+
+  /** Called when a request to open something is made, to end the one before if that takes long. */
+  superseded?(): void;
+
+  /** Called when the engine has loaded, with the parameters of the method. */
+  onEngineReady?(specs: ParamSpec[]): void;
+
+  /** Called when the engine was restarted, to send it the view's settings again. */
+  restarted?(): Promise<unknown>;
+}
+
 /**
  * Opens examples, files and links: gets the data and has the worker build a model of it. The newest request wins; when
- * it fails, everything stays as before. Subclasses implement what differs between the labs.
+ * it fails, everything stays as before.
  */
-export abstract class Opening<Example, Linked extends { example?: string; file?: string }, Data, Opened> {
+export class Opening<Example, Linked extends { example?: string; file?: string }, Data, Opened> {
   readonly #engine: Engine;
   readonly #ui: OpeningParts<Example>;
-  protected readonly states: LabStates;
+  readonly #states: LabStates;
+  readonly #lab: LabData<Example, Linked, Data, Opened>;
   #source: Source<Example, Linked, Data> | undefined;
   /**
    * Settings in a link that names a file of the user's, to be applied when the user opens a file; undefined if there is
@@ -110,90 +181,27 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   /** Called when other data have taken the place of those that were open. */
   onReplaced: () => void = () => undefined;
 
-  constructor(engine: Engine, ui: OpeningParts<Example>, states: LabStates) {
+  constructor(
+    engine: Engine,
+    ui: OpeningParts<Example>,
+    states: LabStates,
+    lab: LabData<Example, Linked, Data, Opened>,
+  ) {
     this.#engine = engine;
     this.#ui = ui;
-    this.states = states;
+    this.#states = states;
+    this.#lab = lab;
   }
 
-  /** The example that opens by default. */
-  protected abstract readonly first: Example;
-
-  /** Returns the example with this id, undefined if there is none. */
-  protected abstract find(id: string): Example | undefined;
-
-  /** Parses the hash of an address; undefined if it contains no settings for this lab. */
-  protected abstract linkedBy(hash: string): Linked | undefined;
-
-  /** Returns all that is needed to open an example, without downloading it yet. */
-  protected abstract fromExample(example: Example): Source<Example, Linked, Data>;
-
-  /** Returns all that is needed to open the user's files, without reading them yet. */
-  protected abstract fromFiles(files: File[]): Source<Example, Linked, Data>;
-
-  /** Returns the files among the data, which sessions describe or include; none by default, as if all were computed. */
-  filesOf(_data: Data): NamedBytes[] {
-    return [];
+  /** Returns the files among the data, which sessions describe or include. */
+  filesOf(data: Data): NamedBytes[] {
+    return this.#lab.filesOf?.(data) ?? [];
   }
 
-  /**
-   * Has the worker build a model of the data. With `reopening`, the same source was open before, and the engine was
-   * restarted.
-   */
-  protected abstract load(source: Source<Example, Linked, Data>, data: Data, reopening: boolean): Promise<Opened>;
-
-  /**
-   * Displays what was opened, with the settings of its example or link, and runs it; with `reopening`, with the
-   * previous settings.
-   */
-  protected abstract adopt(opened: Opened, source: Source<Example, Linked, Data>, reopening: boolean): Promise<void>;
-
-  /**
-   * Returns the source to open again after a failure of the engine: by default `source`; a subclass may return another.
-   */
-  protected sourceToRemember(
-    source: Source<Example, Linked, Data>,
-    _opened: Opened,
-    _data: Data,
-  ): Source<Example, Linked, Data> {
-    return source;
-  }
-
-  /** Returns the number of voxels of what was opened; 0 by default. */
-  protected voxelsOf(_opened: Opened): number {
-    return 0;
-  }
-
-  /**
-   * Has the worker save the present model, so that undo or a restarted engine can restore it; does nothing by default.
-   */
-  protected save(): void {}
-
-  /**
-   * Returns a promise that settles when all pending saves of the model are complete; at once, unless a subclass saves
-   * anything.
-   */
-  protected async saved(): Promise<unknown> {
-    return undefined;
-  }
-
-  /** Opens what another lab passes on; by default nothing is accepted, and the first example opens. */
-  passedOn(_handoff: Handoff): Promise<void> {
-    return this.default();
-  }
-
-  /** Called when opening has failed, and what was open before stays; does nothing by default. */
-  protected kept(): void {}
-
-  /** Called when a request to open something is made, to end the one before if that takes long; does nothing by default. */
-  protected superseded(): void {}
-
-  /** Called when the engine has loaded, with the parameters of the method; does nothing by default. */
-  protected onEngineReady(_specs: ParamSpec[]): void {}
-
-  /** Called when the engine was restarted, to send it the view's settings again; does nothing by default. */
-  protected async restarted(): Promise<unknown> {
-    return undefined;
+  /** Opens what another lab passes on. */
+  passedOn(handoff: Handoff): Promise<void> {
+    const source = this.#lab.fromHandoff?.(handoff);
+    return source ? this.open(source) : this.default();
   }
 
   /**
@@ -210,7 +218,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       this.#started = greeting.catch(() => undefined);
       await greeting;
     } catch (error) {
-      this.states.fail(text('labs.startFailed'), error);
+      this.#states.fail(text('labs.startFailed'), error);
       return;
     }
     if (signal.aborted) return;
@@ -223,14 +231,14 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       onFollowed();
     };
     window.addEventListener('hashchange', (event) => void follow(event), { signal });
-    if (this.#requestCount === 0) await (passedOn ? passedOn() : this.#link(this.first));
+    if (this.#requestCount === 0) await (passedOn ? passedOn() : this.#link(this.#lab.first));
   }
 
   /** Waits until the engine has loaded, and makes controls for its parameters. */
   async #greet(): Promise<void> {
     const { specs } = await this.#engine.request('hello', undefined);
     this.#ui.makeParams(specs);
-    this.onEngineReady(specs);
+    this.#lab.onEngineReady?.(specs);
   }
 
   /** The source of the data that is open; undefined if there is none. */
@@ -245,7 +253,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
 
   /** Opens an example, with the settings in a link, if given. */
   example(example: Example, linked?: Linked): Promise<void> {
-    return this.open({ ...this.fromExample(example), ...(linked && { linked }) });
+    return this.open({ ...this.#lab.fromExample(example), ...(linked && { linked }) });
   }
 
   /**
@@ -253,7 +261,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    * to no other.
    */
   async files(files: File[]): Promise<void> {
-    const source = this.fromFiles(files);
+    const source = this.#lab.fromFiles(files);
     const waiting = this.#awaiting;
     const linked = waiting?.file === source.name ? waiting : undefined;
     await this.open({ ...source, ...(linked && { linked }) });
@@ -267,9 +275,9 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   /** Opens the data of a session, its example or else `files`, and continues it. */
   session(session: Session, files: File[]): Promise<void> {
     const { name, example: id } = session.source;
-    const example = id === undefined ? undefined : this.find(id);
-    const own = files.length > 0 ? [this.fromFiles(files)] : [];
-    const origins = example ? [this.fromExample(example), ...own] : own;
+    const example = id === undefined ? undefined : this.#lab.find(id);
+    const own = files.length > 0 ? [this.#lab.fromFiles(files)] : [];
+    const origins = example ? [this.#lab.fromExample(example), ...own] : own;
     const load = () => this.#matching(session.source, origins);
     // Data that came with the session may be nowhere else.
     const isMade = !example && session.source.files.every(({ content }) => content);
@@ -291,7 +299,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
 
   /** Opens the first example. */
   default(): Promise<void> {
-    return this.example(this.first);
+    return this.example(this.#lab.first);
   }
 
   /** Opens the present source again, after a failure of the engine. */
@@ -305,13 +313,13 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    */
   async cancel(): Promise<void> {
     const request = this.#requestCount;
-    this.states.cancel(text('labs.cancelling'));
+    this.#states.cancel(text('labs.cancelling'));
     await this.#savedInTime();
-    if (request !== this.#requestCount || this.states.value !== 'loading') return;
-    this.states.engineBroken = true;
+    if (request !== this.#requestCount || this.#states.value !== 'loading') return;
+    this.#states.engineBroken = true;
     const source = this.#source;
     const again = () => text('labs.cancelledReopening', { name: source?.name ?? '' });
-    const opening = source ? this.open(source, true, again()) : this.example(this.first);
+    const opening = source ? this.open(source, true, again()) : this.example(this.#lab.first);
     const own = this.#requestCount;
     await opening;
     if (own === this.#requestCount && !this.#ui.banner.shown) this.#ui.status.say(text('labs.cancelled'));
@@ -322,7 +330,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
    * `otherwise`, if given; if the address names an unknown example or the user's file, a banner says so.
    */
   async #link(otherwise?: Example): Promise<void> {
-    const linked = readLink(() => this.linkedBy(location.hash));
+    const linked = readLink(() => this.#lab.linkedBy(location.hash));
     if (linked instanceof LinkError) {
       if (otherwise) await this.example(otherwise);
       return this.#ui.banner.show(text('labs.linkInvalid'), linked.message);
@@ -338,24 +346,24 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   }
 
   #exampleOf({ example, file }: Linked): Example | undefined {
-    if (example !== undefined) return this.find(example);
-    return file ? undefined : this.first;
+    if (example !== undefined) return this.#lab.find(example);
+    return file ? undefined : this.#lab.first;
   }
 
   /**
    * Opens a source: gets its data, has the worker build a model of it, and displays it. Stops if a newer request to
    * open something has been made. The status line says `says` meanwhile.
    */
-  protected async open(
+  async open(
     source: Source<Example, Linked, Data>,
     reopening = false,
     says = reopening ? text('labs.restartingEngine') : text('labs.opening', { name: source.name }),
   ): Promise<void> {
     const request = ++this.#requestCount;
-    this.superseded();
-    if (this.states.canChange) this.save();
-    const isFirst = source.example === this.first && source.linked === undefined && source.session === undefined;
-    const changesDone = this.states.open(says, !isFirst, reopening);
+    this.#lab.superseded?.();
+    if (this.#states.canChange) this.#lab.save?.();
+    const isFirst = source.example === this.#lab.first && source.linked === undefined && source.session === undefined;
+    const changesDone = this.#states.open(says, !isFirst, reopening);
     try {
       await this.#started;
       await this.#needEngine();
@@ -369,15 +377,15 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
       await this.#needEngine();
       const opened = await this.#load(source, data, reopening);
       if (request !== this.#requestCount) return;
-      this.states.finishOpening(true);
+      this.#states.finishOpening(true);
       const before = this.#source;
-      this.#source = this.sourceToRemember(source, opened, data);
+      this.#source = this.#lab.sourceToRemember?.(source, opened, data, before) ?? source;
       this.#modelMismatch = false;
       const isKept = source.isKept || source.isMade || false;
-      this.#givesWay = isKept && this.voxelsOf(opened) > HEAVY;
+      this.#givesWay = isKept && (this.#lab.voxelsOf?.(opened) ?? 0) > HEAVY;
       if (!reopening) this.onReplaced();
       if (source.linked && source.linked === this.#awaiting) this.#awaiting = undefined;
-      const adoption = this.adopt(opened, source, reopening);
+      const adoption = this.#lab.adopt(opened, source, reopening);
       this.#adoption = adoption.catch(() => undefined);
       await adoption.catch((error) => {
         if (!source.session) throw error;
@@ -389,7 +397,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   }
 
   #load(source: Source<Example, Linked, Data>, data: Data, reopening: boolean): Promise<Opened> {
-    const loading = this.load(source, data, reopening);
+    const loading = this.#lab.load(source, data, { reopening, present: this.#source });
     this.#loads = loading.then(
       () => {
         this.#modelMismatch = true;
@@ -400,18 +408,18 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   }
 
   async #failed(source: Source<Example, Linked, Data>, error: unknown, reopening: boolean): Promise<void> {
-    this.states.finishOpening(false);
+    this.#states.finishOpening(false);
     const { code, message } = toFailure(error);
-    if (code !== 'internal' && !this.states.engineBroken && !reopening && source.linked && !source.isChange)
+    if (code !== 'internal' && !this.#states.engineBroken && !reopening && source.linked && !source.isChange)
       return this.#openWithoutLink(source, message);
     this.#ui.data.choose(this.#source?.example);
-    this.kept();
+    this.#lab.kept?.(this.#source);
     const title = text('labs.openFailed', { name: source.name });
     if (this.#modelMismatch) {
-      this.states.engineBroken = true;
+      this.#states.engineBroken = true;
       if (code !== 'internal' && this.#source && !reopening) return this.#openPrevious(title, message);
     }
-    this.states.fail(title, error);
+    this.#states.fail(title, error);
   }
 
   /** Opens what is displayed again, after the worker has replaced it by what then could not be opened, and says why. */
@@ -419,7 +427,7 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     const opening = this.reopen();
     const own = this.#requestCount;
     await opening;
-    if (own === this.#requestCount && this.states.value !== 'error') this.#ui.banner.show(title, why);
+    if (own === this.#requestCount && this.#states.value !== 'error') this.#ui.banner.show(title, why);
   }
 
   /**
@@ -432,20 +440,20 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
     error: unknown,
   ): Promise<void> {
     const { code, message } = toFailure(error);
-    if (code === 'internal') this.states.engineBroken = true;
+    if (code === 'internal') this.#states.engineBroken = true;
     // After a failure of the engine, the session itself was open.
     this.#source = before?.session === failed.session ? undefined : before;
-    const opening = this.open(this.#source ?? this.fromExample(this.first));
+    const opening = this.open(this.#source ?? this.#lab.fromExample(this.#lab.first));
     const own = this.#requestCount;
     await opening;
-    if (own === this.#requestCount && this.states.value !== 'error')
+    if (own === this.#requestCount && this.#states.value !== 'error')
       this.#ui.banner.show(text('labs.openFailed', { name: failed.name }), message);
   }
 
   /** Opens a link's example or file without the link's settings, after one of them was rejected, and says why. */
   async #openWithoutLink({ linked: _, ...source }: Source<Example, Linked, Data>, why: string): Promise<void> {
     await this.open(source);
-    if (this.states.value === 'error' || this.#source !== source) return;
+    if (this.#states.value === 'error' || this.#source !== source) return;
     this.#ui.banner.show(text('labs.linkSettingsIgnored'), text('labs.linkSettingRejected', { reason: why }));
   }
 
@@ -456,22 +464,22 @@ export abstract class Opening<Example, Linked extends { example?: string; file?:
   async #makeRoom(): Promise<void> {
     if (!this.#givesWay) return;
     await this.#savedInTime();
-    this.states.engineBroken = true;
+    this.#states.engineBroken = true;
   }
 
   /** Settles when all pending saves of the model are complete, or take too long. */
   #savedInTime(): Promise<unknown> {
-    return Promise.race([this.saved(), later(SAVE_TIMEOUT_MS)]);
+    return Promise.race([this.#lab.saved?.(), later(SAVE_TIMEOUT_MS)]);
   }
 
   /** Restarts the engine if it is broken. */
   async #needEngine(): Promise<void> {
-    if (!this.states.engineBroken) return;
+    if (!this.#states.engineBroken) return;
     this.#engine.restart({ code: 'internal', message: text('labs.engineRestarted') });
     this.#modelMismatch = true;
     await this.#greet();
-    await this.restarted();
-    this.states.engineBroken = false;
+    await this.#lab.restarted?.();
+    this.#states.engineBroken = false;
   }
 }
 

@@ -18,13 +18,9 @@ import type { Work, WorkKind } from './work';
 /** A lab, as its sessions need it. */
 interface SessionLab<Example> {
   id: (typeof LAB_IDS)[number];
-  ui: {
-    banner: ErrorBanner;
-    status: StatusLine;
-    saving: Saving;
-    warnings: WarningList;
-    finish?: Finish | undefined;
-  };
+  page: { banner: ErrorBanner; status: StatusLine; saving: Saving; warnings: WarningList };
+  /** The controls of its run, if it has one. */
+  run?: { readonly finish: Finish | undefined };
   states: LabStates;
   work: Work;
   opening: AnyOpening<Example>;
@@ -113,14 +109,14 @@ export class Sessions<Example extends { id: string }> {
   }
 
   async #save(source: OpenSource<Example>, included: boolean): Promise<void> {
-    const { opening, ui, states } = this.#lab;
+    const { opening, page, states } = this.#lab;
     try {
-      ui.status.say(text('sessions.saving'));
+      page.status.say(text('sessions.saving'));
       const [{ describe, writeSession }, content, data] = await Promise.all([format(), this.#content(), source.load()]);
       if (!content) throw new Error(text('sessions.notSaved'));
       const files = await describe(opening.filesOf(data), included || source.isMade === true);
       const bytes = await writeSession(this.#sessionOf(source, files, content));
-      ui.saving.bytes('vesicle.zip', bytes, 'application/zip');
+      page.saving.bytes('vesicle.zip', bytes, 'application/zip');
       this.#lab.onSaved();
     } catch (error) {
       states.fail(text('sessions.saveFailed'), error);
@@ -129,10 +125,10 @@ export class Sessions<Example extends { id: string }> {
 
   /** Returns the lab's part of a session, with the edits of its surface and its warnings. */
   async #content(): Promise<object | undefined> {
-    const { ui, content } = this.#lab;
+    const { page, run, content } = this.#lab;
     // A run that is paused and continued ends them.
-    const { log: edits = [], undone = [] } = ui.finish ?? {};
-    const [warnings, kept] = [ui.warnings.all, { edits: [...edits], undone: [...undone] }];
+    const { log: edits = [], undone = [] } = run?.finish ?? {};
+    const [warnings, kept] = [page.warnings.all, { edits: [...edits], undone: [...undone] }];
     const body = await content();
     return body && { ...body, ...kept, ...(warnings.length > 0 && { warnings }) };
   }
@@ -201,25 +197,25 @@ export class Sessions<Example extends { id: string }> {
 
   /** Opens a session, or asks for its data if it has none. */
   async #open(session: Session): Promise<void> {
-    const { opening, ui } = this.#lab;
+    const { opening, page } = this.#lab;
     const { files, name } = session.source;
     this.#waiting = undefined;
     if (files.every(({ content }) => content)) return this.#restore(session, files.map(fileOf));
     if (!waits(session)) return this.#restore(session, []);
     if (!opening.source) await opening.default();
     this.#waiting = session;
-    ui.banner.show(text('sessions.needsData'), text('sessions.needsDataHint', { name }));
+    page.banner.show(text('sessions.needsData'), text('sessions.needsDataHint', { name }));
   }
 
   /** Continues a session with its data, and edits its surface as before. */
   async #restore(session: Session, files: File[]): Promise<void> {
-    const { opening, ui, states } = this.#lab;
+    const { opening, page, run, states } = this.#lab;
     if (await anyForeign(files)) throw new Error(text('sessions.foreign'));
     await opening.session(session, files);
     const { edits, undone, warnings } = session.content;
     if (opening.source?.session !== session) return;
-    ui.warnings.restore(warnings);
-    const repeated = ui.finish?.repeat(edits, undone, session.isSmall);
+    page.warnings.restore(warnings);
+    const repeated = run?.finish?.repeat(edits, undone, session.isSmall);
     await repeated?.catch((error) => states.fail(text('sessions.editsFailed'), error));
     const kinds = this.#kinds.get(session);
     if (kinds) this.#lab.work.resume(kinds);

@@ -2,119 +2,133 @@ import type { VertexQuantity } from '../../engine/protocol';
 import { History } from '../../kit/history';
 import type { LabState } from '../../kit/state';
 import type { ViewOptions } from '../../kit/view-options';
-import type { Handoff, OpenInLab } from '../../lab/lab';
-import { RunLab } from '../../lab/shell';
+import type { Lab, LabPlace } from '../../lab/lab';
+import { Opening } from '../../lab/opening';
+import { type RunningLab, Runs } from '../../lab/runs';
+import { LabShell } from '../../lab/shell';
 import { LabStates } from '../../lab/states';
 import { text } from '../../texts';
-import { Client, toFailure } from './client';
+import { connectExtract, toFailure } from './client';
+import { ExtractData, type ExtractOpening, type ExtractSource, fetchLinked, frameOf } from './data';
 import type { Example } from './examples';
 import { linkOf, MOST_ATTRACTORS, toHash } from './link';
-import { ExtractOpening, type ExtractSource, frameOf } from './opening';
 import { ExtractParts, type PartEvents } from './parts';
 import type { WorkerEvent } from './protocol';
 import { ExtractResults } from './results';
 import { ExtractSettings } from './settings';
 
 /** The Extract lab: a deformable surface is fitted to a volume. Opening, settings and results are in files of their own. */
-export class ExtractLab extends RunLab<Example> {
-  protected readonly id = 'extract';
-  protected readonly client = new Client((event) => this.#onEvent(event));
-  protected readonly ui: ExtractParts;
-  protected readonly states: LabStates;
-  protected readonly opening: ExtractOpening;
+class ExtractLab implements RunningLab<Example> {
+  readonly shell: LabShell<Example>;
+  readonly #runs: Runs<Example>;
+
+  readonly id = 'extract';
+  readonly client = connectExtract((event) => this.#onEvent(event));
+  readonly ui: ExtractParts;
+  readonly states: LabStates;
+  readonly opening: ExtractOpening;
+  readonly #data: ExtractData;
   readonly #results: ExtractResults;
   readonly #settings: ExtractSettings;
   /** Quantity that the worker computes at each vertex to colour the surface by; undefined if none is needed. */
   #quantity: VertexQuantity | undefined;
 
-  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
-    super(root, help, passOn);
+  constructor(place: LabPlace) {
+    const shell = new LabShell(place, this);
+    const runs = new Runs(shell, this);
+    this.shell = shell;
+    this.#runs = runs;
     const { client } = this;
-    const { signal } = this.closing;
+    const { root, signal } = shell;
     const history = new History();
-    const ui = new ExtractParts(root, history, (request) => client.request('export', request), signal, this.#events());
-    const states = new LabStates(ui.banner, ui.status, signal);
+    const ui = new ExtractParts(root, history, client, signal, this.#events());
+    const states = new LabStates(ui.page.banner, ui.page.status, signal);
     this.ui = ui;
     this.states = states;
     this.#results = new ExtractResults(client, ui, states, history);
     this.#settings = new ExtractSettings(client, ui, states, this.#results, () => this.#showSettings());
-    this.opening = new ExtractOpening(client, ui, states, this.#settings, this.#results, () =>
+    this.#data = new ExtractData(client, ui, states, this.#settings, this.#results, () =>
       client.request('quantity', this.#quantity),
     );
+    this.opening = new Opening(client, ui.page, states, this.#data);
     const attract = () => ui.attractors.add(ui.stage.crosshair);
-    this.beginRuns([{ key: 'a', shown: 'a', text: text('extract.attractorKey'), act: attract }]);
+    runs.begin([{ key: 'a', shown: 'a', text: text('extract.attractorKey'), act: attract }]);
   }
 
-  override async start(passedOn?: Handoff): Promise<void> {
-    if (!passedOn) ExtractOpening.fetchLinked();
-    await super.start(passedOn);
+  starting(): void {
+    fetchLinked();
   }
 
-  protected override closed(): void {
+  closed(): void {
     this.#results.close();
   }
 
   /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
-      ...this.runEvents(),
+      ...this.#runs.events(),
       onLarge: (name, source) => {
-        this.forgetSession();
-        void this.opening.large(name, source);
+        this.shell.forgetSession();
+        void this.opening.open({ name, load: async () => source });
       },
-      onFrame: (frame) => void this.opening.frame(frame),
+      onFrame: (frame) => this.#openFrame(frame),
       onVariant: (preset, variant) => void this.#settings.changeTo(preset, variant),
       onStart: () => void this.#settings.restart(),
       onParam: (name, value) => void this.#settings.setParam(name, value),
       onAttractors: (attractors, what, tuning) => void this.#settings.setAttractors(attractors, what, tuning),
       onOptions: (options) => this.#setOptions(options),
       onPlanes: (planes) => {
-        if (!this.states.engineBroken) this.ask(this.client.request('planes', planes));
+        if (!this.states.engineBroken) this.shell.ask(this.client.request('planes', planes));
       },
       onCompare: () => void this.#compare(),
-      onCancelCompare: () => this.ask(this.client.request('cancelCompare', undefined)),
+      onCancelCompare: () => this.shell.ask(this.client.request('cancelCompare', undefined)),
       onCoverage: () => void this.#measureCoverage(),
-      onCancelCoverage: () => this.ask(this.client.request('cancelCoverage', undefined)),
+      onCancelCoverage: () => this.shell.ask(this.client.request('cancelCoverage', undefined)),
       onSeed: () => void this.#settings.seed(),
-      onSegment: () => this.ask(this.#toSegment()),
-      onSculpt: () => this.toSculpt(this.ui.surfaceFile({ format: 'ply' })),
+      onSegment: () => this.shell.ask(this.#toSegment()),
+      onSculpt: () => this.#runs.toSculpt(this.ui.run.surfaceFile({ format: 'ply' })),
     };
+  }
+
+  #openFrame(frame: number): void {
+    const { source } = this.opening;
+    if (source) void this.opening.open(this.#data.atFrame(source, frame));
   }
 
   /** Opens the volume's file in the Segment lab. */
   async #toSegment(): Promise<void> {
     const { source } = this.opening;
     const [file] = source ? this.opening.filesOf(await source.load()) : [];
-    if (file) this.passOn({ lab: 'segment', ...file, params: {} });
+    if (file) this.shell.passOn({ lab: 'segment', ...file, params: {} });
   }
 
-  protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {
-    const moments = await this.paused(() => this.#settings.moments());
+  async sessionContent(): Promise<Record<string, unknown> | undefined> {
+    const moments = await this.#runs.paused(() => this.#settings.moments());
     if (!moments) return undefined;
     const view = { ...this.ui.stage.view, options: this.ui.options.value };
     return { ...(await import('../../lab/session/moments')).packMoments(moments), view };
   }
 
-  protected override linkLacks(): (string | false)[] {
+  linkLacks(): (string | false)[] {
     return [this.#settings.attractors.length > MOST_ATTRACTORS && text('extract.linkLacksAttractors')];
   }
 
   #showSettings(): void {
     this.ui.showParams(this.#settings.params, this.opening.source?.example);
-    this.updateAddress();
+    this.shell.updateAddress();
   }
 
   #setOptions({ color }: ViewOptions): void {
     const quantity = color === 'plain' || color === 'component' ? undefined : color;
-    if (quantity !== this.#quantity) this.ask(this.client.request('quantity', quantity));
+    if (quantity !== this.#quantity) this.shell.ask(this.client.request('quantity', quantity));
     this.#quantity = quantity;
-    this.updateAddress();
+    this.shell.updateAddress();
   }
 
-  protected address(source: ExtractSource): string {
+  address(source: ExtractSource): string {
     const { example, name: file } = source;
     const { params, sphere, attractors } = this.#settings;
-    const { defaults } = this.opening;
+    const { defaults } = this.#data;
     const choice = this.ui.start.inForce;
     return toHash(
       linkOf({
@@ -131,15 +145,15 @@ export class ExtractLab extends RunLab<Example> {
     );
   }
 
-  protected override beforeRun(change: string): void {
+  beforeRun(change: string): void {
     this.#settings.checkpoint(change);
   }
 
-  protected startOver(): Promise<void> {
+  startOver(): Promise<void> {
     return this.#settings.startOver();
   }
 
-  protected travel(way: 'undo' | 'redo'): Promise<void> {
+  travel(way: 'undo' | 'redo'): Promise<void> {
     return this.#settings.travel(way);
   }
 
@@ -171,22 +185,25 @@ export class ExtractLab extends RunLab<Example> {
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (this.takes(event)) return;
+    if (this.#runs.takes(event)) return;
     if (event.event === 'comparing') this.ui.compare.showProgress(event);
     else if (event.event === 'data') this.ui.large.showProgress(event);
     else if (event.event === 'covering') this.ui.coverage.showProgress(event);
     else this.#results.take(event);
   }
 
-  protected settled(state: LabState): void {
+  settled(state: LabState): void {
     this.#results.showState(state);
   }
 
-  protected showControls(state: LabState): void {
+  showControls(state: LabState): void {
     this.ui.showState(state, this.states.modelState, this.states.ready);
   }
 
-  protected describe(): string {
+  describe(): string {
     return this.#results.describe(this.states.value);
   }
 }
+
+/** Makes the Extract lab. */
+export const openExtract = (place: LabPlace): Lab => new ExtractLab(place).shell;

@@ -8,12 +8,14 @@ import { MeasurePanel } from '../../kit/measures';
 import { ENERGY_PLOTS, Plots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
 import { EXTRACT_OPTIONS, OptionControls, type ViewOptions } from '../../kit/view-options';
-import { type FetchMesh, type RunEvents, RunParts } from '../../lab/parts';
+import { LabPage } from '../../lab/page';
+import { RunControls, type RunEvents } from '../../lab/run-controls';
 import { spaceOf, unitOf } from '../../lab/surface-space';
 import { Stage } from '../../scene/stage';
 import { text } from '../../texts';
+import type { ExtractClient } from './client';
+import { type ExtractSource, frameOf } from './data';
 import type { Example } from './examples';
-import { type ExtractSource, frameOf } from './opening';
 import { extractData, factsOf } from './page';
 import { AttractorControls } from './panels/attractors';
 import { ComparePanel } from './panels/compare';
@@ -49,7 +51,10 @@ export interface PartEvents extends RunEvents<Example> {
 }
 
 /** Controls and views of the Extract lab. */
-export class ExtractParts extends RunParts<Example> {
+export class ExtractParts {
+  readonly page: LabPage<Example>;
+  readonly run: RunControls;
+
   readonly #labels: LabelsOffer;
   readonly #slices = h('div', { class: 'slices' });
   readonly stage: Stage;
@@ -72,24 +77,26 @@ export class ExtractParts extends RunParts<Example> {
   readonly #log = new EventLog();
   readonly #compareHolder: HTMLDetailsElement;
 
-  constructor(root: HTMLElement, history: History, fetchMesh: FetchMesh, signal: AbortSignal, events: PartEvents) {
+  constructor(root: HTMLElement, history: History, client: ExtractClient, signal: AbortSignal, events: PartEvents) {
     const large = new LargeSourceControls(events.onLarge);
     const frames = new FrameChoice(events.onFrame);
     const chooser = fileChooser(events.onFiles);
-    super(root, signal, events, {
+    this.page = new LabPage(root, signal, events, {
       viewLabel: text('extract.viewLabel'),
       drop: text('extract.drop'),
       admission: 'volume',
       onFolder: (folder) => events.onLarge(folder.name, { zarr: folder }),
       data: extractData(chooser, [frames.element, large.element], events.onExample),
       ownControls: ['iso'],
+    });
+    this.run = new RunControls(this.page, events, {
       history,
-      fetchMesh,
+      fetchMesh: (request) => client.request('export', request),
     });
     this.large = large;
     this.#frames = frames;
     this.#labels = new LabelsOffer(events.onSegment);
-    this.stage = new Stage(this.canvas, this.#slices, INITIAL_VIEW, events.onPlanes);
+    this.stage = new Stage(this.page.canvas, this.#slices, INITIAL_VIEW, events.onPlanes);
     this.#figure = new FigurePanel<Variant, Preset>(events.onVariant);
     this.histogram = new Histogram((iso) => events.onParam('iso', iso));
     this.start = new StartControls(events.onStart);
@@ -119,26 +126,26 @@ export class ExtractParts extends RunParts<Example> {
     this.#compareHolder = folded(text('extract.sectionCompare'), this.compare.element);
     this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
     this.#plots = new Plots(history, ENERGY_PLOTS, true);
-    this.warnings.actions = { point: (point) => this.stage.goTo(point) };
-    this.layOut({
+    this.page.warnings.actions = { point: (point) => this.stage.goTo(point) };
+    this.page.layOut({
       name: 'extract',
       options: this.options.element,
       over: [this.stage.legend.element, this.stage.editing.legend.element],
-      stage: (view, status) => [view, this.transport.element, status, this.#slices],
+      stage: (view, status) => [view, this.run.transport.element, status, this.#slices],
       setup: [
-        section(text('extract.sectionData'), this.data.element, this.#labels.element, this.#figure.element),
+        section(text('extract.sectionData'), this.page.data.element, this.#labels.element, this.#figure.element),
         section(text('extract.sectionIntensities'), this.histogram.element),
         section(text('extract.sectionStart'), this.start.element),
         section(text('extract.sectionPyramid'), this.pyramid.element),
         section(text('extract.sectionAttractors'), this.attractors.element),
-        this.paramsSection(true),
+        this.page.paramsSection(true),
       ],
       results: [
-        section(text('labs.sectionSurface'), this.warnings.element, this.measures.element),
+        section(text('labs.sectionSurface'), this.page.warnings.element, this.measures.element),
         section(text('extract.sectionCoverage'), this.coverage.element),
-        this.saveSection(this.stage.subject, this.#sculpt),
-        ...this.finishSections(this.stage.editing, this.measures),
-        section(text('labs.sectionProgress'), this.#plots.element, this.csv),
+        this.run.saveSection(this.stage.subject, this.#sculpt),
+        ...this.run.finishSections(this.stage.editing, this.measures),
+        section(text('labs.sectionProgress'), this.#plots.element, this.run.csv),
         section(text('extract.sectionEvents'), this.#log.element),
         section(text('extract.sectionTimes'), this.#times.element),
         this.#compareHolder,
@@ -150,15 +157,15 @@ export class ExtractParts extends RunParts<Example> {
   adopt(volume: VolumeView, source: ExtractSource, labels: number): void {
     const { example, unit = unitOf(volume) } = source;
     this.#labels.show(example ? 0 : labels);
-    this.saving.name = volume.name;
-    this.warnings.showData(source.warnings, volume.warnings);
+    this.page.saving.name = volume.name;
+    this.page.warnings.showData(source.warnings, volume.warnings);
     const shown = example?.unit ?? unit;
     this.measures.unit = shown;
     this.stage.unit = shown;
-    this.unit = shown;
-    this.surfaceSpace = spaceOf(volume, shown);
+    this.run.unit = shown;
+    this.run.surfaceSpace = spaceOf(volume, shown);
     this.histogram.setVolume(volume);
-    this.data.show(factsOf(volume, shown), example);
+    this.page.data.show(factsOf(volume, shown), example);
     this.#frameCount = volume.frames;
     this.showFrame(source);
     this.large.showTotal(volume.large?.bytes);
@@ -175,15 +182,15 @@ export class ExtractParts extends RunParts<Example> {
   }
 
   showParams(params: ParamValues, example: Example | undefined): void {
-    this.displayParams(params);
+    this.page.showParams(params);
     if (typeof params.iso === 'number') this.histogram.setIso(params.iso);
     if (isPreset(example)) this.#figure.show(example, variantInForce(example, params));
     else this.#figure.show(undefined);
   }
 
-  override refuseParam(name: string, message: string): void {
+  refuseParam(name: string, message: string): void {
     if (name === 'iso') this.histogram.showError(message);
-    else super.refuseParam(name, message);
+    else this.page.refuseParam(name, message);
   }
 
   /** Shows the attractors in force in the list on the page, in the 3D view and on the slices. */
@@ -193,35 +200,35 @@ export class ExtractParts extends RunParts<Example> {
   }
 
   showHistory(): void {
-    this.showRunWarnings();
+    this.run.showWarnings();
     this.#plots.update();
-    this.#times.update(this.history);
-    this.csv.disabled = this.history.reports.length === 0;
-    this.#log.update(this.history);
+    this.#times.update(this.run.history);
+    this.run.csv.disabled = this.run.history.reports.length === 0;
+    this.#log.update(this.run.history);
   }
 
   /** Shows the run's history after it was cleared, or set back by undo; {@link showHistory} suffices after steps. */
   replaceHistory(): void {
     this.#log.clear();
-    this.transport.showReport(this.history.reports.at(-1));
+    this.run.transport.showReport(this.run.history.reports.at(-1));
     this.showHistory();
   }
 
   showState(state: LabState, beneath: LabState, ready: boolean): void {
-    const idle = this.showRunState(state, beneath, ready);
+    const idle = this.run.showState(state, beneath, ready);
     this.#sculpt.disabled = !idle;
     this.compare.enabled = idle;
     this.coverage.enabled = idle;
   }
 
-  override dispose(): void {
-    super.dispose();
+  dispose(): void {
+    this.run.dispose();
     this.stage.dispose();
   }
 
   #setPlacing(placing: boolean): void {
     this.stage.onPlace = placing ? (point) => this.attractors.add(point) : undefined;
-    this.root.toggleAttribute('data-placing', placing);
-    this.status.say(placing ? text('extract.placeAttractors') : '');
+    this.page.root.toggleAttribute('data-placing', placing);
+    this.page.status.say(placing ? text('extract.placeAttractors') : '');
   }
 }

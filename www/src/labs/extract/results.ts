@@ -4,7 +4,7 @@ import { type History, type HistoryMark, underWay } from '../../kit/history';
 import type { LabState } from '../../kit/state';
 import type { LabStates } from '../../lab/states';
 import { plural, text } from '../../texts';
-import type { Client } from './client';
+import type { ExtractClient } from './client';
 import type { ExtractParts } from './parts';
 import type { ProgressEvent, SectionsEvent, SnapshotEvent } from './protocol';
 
@@ -14,7 +14,7 @@ const VANISHED = text('extract.vanishedHint');
 
 /** Displays the results of the Extract lab's worker: surface, cross-sections, measures and history of steps. */
 export class ExtractResults {
-  readonly #client: Client;
+  readonly #client: ExtractClient;
   readonly #ui: ExtractParts;
   readonly #states: LabStates;
   readonly #history: History;
@@ -28,7 +28,7 @@ export class ExtractResults {
   /** Counts requests for the pyramid, so that only the reply to the newest is displayed. */
   #pyramids = 0;
 
-  constructor(client: Client, ui: ExtractParts, states: LabStates, history: History) {
+  constructor(client: ExtractClient, ui: ExtractParts, states: LabStates, history: History) {
     this.#client = client;
     this.#ui = ui;
     this.#states = states;
@@ -77,8 +77,8 @@ export class ExtractResults {
 
   /** Describes the lab's state in the status line; if the surface has vanished, a banner explains possible causes. */
   showState(state: LabState): void {
-    this.#ui.status.say(this.describe(state));
-    if (this.#history.reports.at(-1)?.vertices === 0) this.#ui.banner.show(text('extract.vanished'), VANISHED);
+    this.#ui.page.status.say(this.describe(state));
+    if (this.#history.reports.at(-1)?.vertices === 0) this.#ui.page.banner.show(text('extract.vanished'), VANISHED);
   }
 
   /** Returns the text for the status line in a state of the lab. */
@@ -114,7 +114,7 @@ export class ExtractResults {
    */
   #takeSnapshot(event: SnapshotEvent): void {
     this.#takeReports(event.reports);
-    if (this.#snapshot) this.#client.returnBuffers(this.#snapshot.surface);
+    if (this.#snapshot) this.#return(this.#snapshot.surface);
     this.#snapshot = event;
     this.#level = event.level;
     this.#ui.pyramid.setInUse(event.level);
@@ -130,15 +130,24 @@ export class ExtractResults {
     this.#ui.stage.showSurface(snapshot.surface);
     this.#ui.stage.showSections(snapshot.sections);
     // The previous surface is no longer drawn.
-    if (this.#shown) this.#client.returnBuffers(this.#shown);
+    if (this.#shown) this.#return(this.#shown);
     this.#shown = snapshot.surface;
     this.#ui.showHistory();
   }
 
+  /**
+   * Returns to the worker, for reuse, the arrays of a surface that is no longer drawn, which also tells it that the page
+   * is ready for the next surface.
+   */
+  #return({ positions, normals, indices }: SurfaceBuffers): void {
+    const buffers = { positions, normals, indices };
+    this.#client.post({ kind: 'return', buffers }, [positions.buffer, normals.buffer, indices.buffer]);
+  }
+
   #takeReports(reports: StepReport[]): void {
     if (!this.#history.add(reports)) return;
-    this.#ui.transport.showReport(reports.at(-1));
-    if (this.#states.value === 'running') this.#ui.status.report(() => underWay(this.#history));
+    this.#ui.run.transport.showReport(reports.at(-1));
+    if (this.#states.value === 'running') this.#ui.page.status.report(() => underWay(this.#history));
   }
 
   #showMeasures({ measures }: SnapshotEvent): void {

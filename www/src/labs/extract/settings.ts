@@ -4,7 +4,7 @@ import type { Moments } from '../../lab/session/moments';
 import type { LabStates } from '../../lab/states';
 import { type SavedMoment, UndoHistory } from '../../lab/undo-history';
 import { plural, text } from '../../texts';
-import { type Client, toFailure } from './client';
+import { type ExtractClient, toFailure } from './client';
 import type { StartChoice } from './panels/start';
 import type { ExtractParts } from './parts';
 import type { Preset, Variant } from './presets';
@@ -46,7 +46,7 @@ export type ExtractMoments = Moments<SavedMoment<PageState, SavedRun>>;
  * undoes changes.
  */
 export class ExtractSettings {
-  readonly #client: Client;
+  readonly #client: ExtractClient;
   readonly #ui: ExtractParts;
   readonly #states: LabStates;
   readonly #results: ExtractResults;
@@ -64,7 +64,13 @@ export class ExtractSettings {
    * `onChange` is called whenever the settings in force may have changed, to display them and to update the page's
    * address.
    */
-  constructor(client: Client, ui: ExtractParts, states: LabStates, results: ExtractResults, onChange: () => void) {
+  constructor(
+    client: ExtractClient,
+    ui: ExtractParts,
+    states: LabStates,
+    results: ExtractResults,
+    onChange: () => void,
+  ) {
     this.#client = client;
     this.#ui = ui;
     this.#states = states;
@@ -73,7 +79,7 @@ export class ExtractSettings {
     this.#undo = new UndoHistory<PageState, SavedRun>(
       client,
       () => this.#pageState(),
-      (undoable, redoable) => ui.transport.showUndo(undoable, redoable),
+      (undoable, redoable) => ui.run.transport.showUndo(undoable, redoable),
     );
   }
 
@@ -230,7 +236,7 @@ export class ExtractSettings {
     return this.#states.enqueue(async () => {
       if (this.#states.engineBroken) return this.#refuseParam(name, BROKEN);
       if (!this.#states.canChange) return this.#onChange();
-      const forget = this.checkpoint(text('labs.changeOf', { name: this.#ui.labelOf(name) }), name);
+      const forget = this.checkpoint(text('labs.changeOf', { name: this.#ui.page.labelOf(name) }), name);
       try {
         this.#take(await this.#client.request('setParams', { [name]: value }));
         await this.#goOn();

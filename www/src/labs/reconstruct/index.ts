@@ -1,16 +1,18 @@
 import { History } from '../../kit/history';
 import type { LabState } from '../../kit/state';
-import type { OpenInLab } from '../../lab/lab';
+import type { Lab, LabPlace } from '../../lab/lab';
+import { Opening } from '../../lab/opening';
+import { type RunningLab, Runs } from '../../lab/runs';
 import { contentOf } from '../../lab/session/content';
 import type { ContentOf } from '../../lab/session/schema';
-import { RunLab } from '../../lab/shell';
+import { LabShell } from '../../lab/shell';
 import { LabStates } from '../../lab/states';
 import { text } from '../../texts';
 import { completed } from './before';
-import { ReconstructClient } from './client';
+import { connectReconstruct } from './client';
+import { type CloudOrigin, type OpenedCloud, ReconstructData, type ReconstructOpening } from './data';
 import type { CloudExample } from './examples';
 import { fits, linkOf, photoFor, toHash } from './link';
-import { type CloudOrigin, type OpenedCloud, ReconstructOpening } from './opening';
 import { type PartEvents, ReconstructParts } from './parts';
 import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from './presets';
 import type { ParamValues, PointQuantity, WorkerEvent } from './protocol';
@@ -25,52 +27,68 @@ import { ReconstructSettings } from './settings';
 const VOLUME_SIZE = 96;
 
 /** The Reconstruct lab: an implicit surface is fitted to points. Opening, settings and results are in files of their own. */
-export class ReconstructLab extends RunLab<CloudExample> {
-  protected readonly id = 'reconstruct';
-  protected readonly client = new ReconstructClient((event) => this.#onEvent(event));
-  protected readonly ui: ReconstructParts;
-  protected readonly states: LabStates;
-  protected readonly opening: ReconstructOpening;
+class ReconstructLab implements RunningLab<CloudExample> {
+  readonly shell: LabShell<CloudExample>;
+  readonly #runs: Runs<CloudExample>;
+
+  readonly id = 'reconstruct';
+  readonly client = connectReconstruct((event) => this.#onEvent(event));
+  readonly ui: ReconstructParts;
+  readonly states: LabStates;
+  readonly opening: ReconstructOpening;
+  readonly #data: ReconstructData;
   readonly #results: ReconstructResults;
   readonly #settings: ReconstructSettings;
   readonly #history = new History();
   #quantity: PointQuantity | undefined;
 
-  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
-    super(root, help, passOn);
+  readonly escape = {
+    text: text('reconstruct.dismissKey'),
+    act: () => {
+      const { page, tools, photos } = this.ui;
+      if (page.banner.shown) this.shell.dismiss();
+      else if (tools.tool !== 'none') tools.deselect();
+      else photos.choose(undefined);
+    },
+  };
+
+  constructor(place: LabPlace) {
+    const shell = new LabShell(place, this);
+    const runs = new Runs(shell, this);
+    this.shell = shell;
+    this.#runs = runs;
     const { client } = this;
-    const { signal } = this.closing;
+    const { root, signal } = shell;
     const history = this.#history;
     const ui = new ReconstructParts(root, history, client, signal, this.#events());
-    const states = new LabStates(ui.banner, ui.status, signal);
+    const states = new LabStates(ui.page.banner, ui.page.status, signal);
     this.ui = ui;
     this.states = states;
     this.#results = new ReconstructResults(client, ui, states, history);
     this.#settings = new ReconstructSettings(client, ui, states, this.#results, (params) => this.#showParams(params));
-    this.opening = new ReconstructOpening(client, ui, states, this.#settings, (opened, origin) =>
-      this.#adopt(opened, origin),
-    );
-    this.beginRuns();
+    this.#data = new ReconstructData(client, this.#settings, (opened, origin) => this.#adopt(opened, origin));
+    this.opening = new Opening(client, ui.page, states, this.#data);
+    runs.begin();
   }
 
-  protected override closed(): void {
+  closed(): void {
     this.#results.close();
   }
 
   /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
-      ...this.runEvents(),
+      ...this.#runs.events(),
       onVariant: (preset, variant) => this.#openVariant(preset, variant),
       onChoice: (choice, what) => void this.#settings.change({ choice }, text('labs.changeOf', { name: what })),
       onParam: (name, value) => void this.#settings.setParam(name, value),
       onPick: (hit) => void this.#settings.pick(hit),
       onTakeBack: () => void this.#settings.takeBackEdits(),
       onOptions: (options) => this.#setOptions(options),
-      onPhotograph: () => this.updateAddress(),
+      onPhotograph: () => this.shell.updateAddress(),
       onSaveVolume: () => this.#saveVolume(),
       onPassOn: () => this.#toExtract(),
-      onSculpt: () => this.toSculpt(this.ui.surfaceFile({ format: 'ply' })),
+      onSculpt: () => this.#runs.toSculpt(this.ui.run.surfaceFile({ format: 'ply' })),
     };
   }
 
@@ -108,54 +126,55 @@ export class ReconstructLab extends RunLab<CloudExample> {
     this.#results.showState(state);
   }
 
-  protected override async sessionContent(): Promise<Record<string, unknown>> {
-    const { state, ...model } = await this.paused(() => this.client.request('save', undefined));
+  async sessionContent(): Promise<Record<string, unknown>> {
+    const { state, ...model } = await this.#runs.paused(() => this.client.request('save', undefined));
     const view = { camera: this.ui.view.pose, options: this.ui.options.value };
     return { state, model, ...this.#settings.entries, reports: [this.#history.reports], view };
   }
 
   #openVariant(preset: CloudPreset, { name, params, maxPoints }: CloudVariant): void {
     const choice = { ...this.#settings.choice, maxPoints: maxPoints ?? preset.maxPoints };
-    const changed = { choice, params: { ...this.opening.defaults, ...preset.params, ...params } };
+    const changed = { choice, params: { ...this.#data.defaults, ...preset.params, ...params } };
     void this.#settings.change(changed, text('labs.figureChange', { name }));
   }
 
   #showParams(params: ParamValues): void {
-    const { source, defaults } = this.opening;
-    const example = source?.example;
+    const { defaults } = this.#data;
+    const example = this.opening.source?.example;
     const preset = isCloudPreset(example) ? example : undefined;
     const variant = preset && variantInForce(preset, params, this.#settings.choice.maxPoints, defaults);
     this.ui.showParams(params, preset, variant);
-    this.updateAddress();
+    this.shell.updateAddress();
   }
 
   #setOptions({ color }: CloudViewOptions): void {
     const quantity = color === 'mean curvature' || color === 'distance' ? color : undefined;
-    if (quantity !== this.#quantity) this.ask(this.client.request('quantity', quantity));
+    if (quantity !== this.#quantity) this.shell.ask(this.client.request('quantity', quantity));
     this.#quantity = quantity;
-    this.updateAddress();
+    this.shell.updateAddress();
   }
 
-  protected address({ example, name: file }: CloudOrigin): string {
+  address({ example, name: file }: CloudOrigin): string {
     const { choice, params, edits } = this.#settings;
-    const { defaults } = this.opening;
+    const { defaults } = this.#data;
     const { color } = this.ui.options.value;
     const photo = this.ui.photos.chosen;
     const { size } = this.ui.view;
     return toHash(linkOf({ example, file, choice, params, defaults, edits, size, color, photo }));
   }
 
-  protected override linkLacks(): (string | false)[] {
+  linkLacks(): (string | false)[] {
     return [!fits(this.#settings.edits) && text('reconstruct.linkLacksEdits')];
   }
 
   #saveVolume(): void {
     const volume = this.client.request('volume', { size: VOLUME_SIZE });
     const saved = volume.then(({ extension, bytes }) => {
-      this.ui.saving.bytes(extension, bytes, 'application/octet-stream');
-      if (extension === 'nrrd') this.ui.status.say(text('reconstruct.savedAsNrrd', { stem: this.ui.saving.stem }));
+      this.ui.page.saving.bytes(extension, bytes, 'application/octet-stream');
+      if (extension === 'nrrd')
+        this.ui.page.status.say(text('reconstruct.savedAsNrrd', { stem: this.ui.page.saving.stem }));
     });
-    this.ask(saved, text('reconstruct.volumeFailed'));
+    this.shell.ask(saved, text('reconstruct.volumeFailed'));
   }
 
   /**
@@ -163,54 +182,45 @@ export class ReconstructLab extends RunLab<CloudExample> {
    * inside the surface, f is above it.
    */
   #toExtract(): void {
-    this.ui.status.say(text('reconstruct.samplingVolume'));
-    const name = text('reconstruct.volumeName', { name: this.ui.saving.name });
-    const { surfaceWarnings: warnings } = this.ui;
+    this.ui.page.status.say(text('reconstruct.samplingVolume'));
+    const name = text('reconstruct.volumeName', { name: this.ui.page.saving.name });
+    const { surfaceWarnings: warnings } = this.ui.run;
     const volume = this.client.request('volume', { size: VOLUME_SIZE });
     const passed = volume.then(({ bytes, level }) =>
-      this.passOn({ lab: 'extract', name, bytes, params: { iso: level, isoForce: -1 }, warnings }),
+      this.shell.passOn({ lab: 'extract', name, bytes, params: { iso: level, isoForce: -1 }, warnings }),
     );
-    this.ask(passed, text('reconstruct.volumeFailed'));
+    this.shell.ask(passed, text('reconstruct.volumeFailed'));
   }
 
   /** Rebuilds the model with the same settings and clears the surface; only the points stay. */
-  protected startOver(): Promise<void> {
-    return this.building(async () => {
+  startOver(): Promise<void> {
+    return this.#runs.building(async () => {
       await this.#settings.rebuild();
       this.#results.clear();
     });
   }
 
-  protected travel(way: 'undo' | 'redo'): Promise<void> {
+  travel(way: 'undo' | 'redo'): Promise<void> {
     return this.#settings.travel(way);
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (!this.takes(event)) this.#results.take(event);
+    if (!this.#runs.takes(event)) this.#results.take(event);
   }
 
-  protected settled(state: LabState): void {
+  settled(state: LabState): void {
     this.#results.showState(state);
   }
 
-  protected showControls(state: LabState): void {
+  showControls(state: LabState): void {
     const { modelState, ready } = this.states;
     this.ui.showState(state, modelState, ready, state !== 'loading' && this.#results.complete);
   }
 
-  protected describe(): string {
+  describe(): string {
     return this.#results.describe(this.states.value);
   }
-
-  /** Dismisses the error message, else deselects the edit tool, else leaves the camera of a photograph. */
-  protected override escape(): void {
-    const { banner, tools, photos } = this.ui;
-    if (banner.shown) this.dismiss();
-    else if (tools.tool !== 'none') tools.deselect();
-    else photos.choose(undefined);
-  }
-
-  protected override get escapeText(): string {
-    return text('reconstruct.dismissKey');
-  }
 }
+
+/** Makes the Reconstruct lab. */
+export const openReconstruct = (place: LabPlace): Lab => new ReconstructLab(place).shell;

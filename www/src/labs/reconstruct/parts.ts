@@ -6,13 +6,15 @@ import type { History } from '../../kit/history';
 import { MeasurePanel } from '../../kit/measures';
 import { Plots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
-import { type RunEvents, RunParts } from '../../lab/parts';
+import type { OptionControls } from '../../kit/view-options';
+import { LabPage } from '../../lab/page';
+import { RunControls, type RunEvents } from '../../lab/run-controls';
 import { text } from '../../texts';
 import type { ReconstructClient } from './client';
 import type { CloudExample } from './examples';
 import { FIT_ROWS, RESIDUAL_PLOT } from './measures';
 import { cloudData, factsOf } from './page';
-import { CloudOptionControls } from './panels/cloud-options';
+import { cloudOptions, offerCameras } from './panels/cloud-options';
 import { type CloudChoice, CloudSetup } from './panels/cloud-setup';
 import { EditTools } from './panels/edit-tools';
 import { KernelPlot } from './panels/kernel-plot';
@@ -47,13 +49,16 @@ export interface PartEvents extends RunEvents<CloudExample> {
 }
 
 /** Controls and views of the Reconstruct lab. */
-export class ReconstructParts extends RunParts<CloudExample> {
-  readonly view = new ReconstructionView(this.canvas, INITIAL_VIEW);
+export class ReconstructParts {
+  readonly page: LabPage<CloudExample>;
+  readonly run: RunControls;
+
+  readonly view: ReconstructionView;
   readonly phases = new PhaseList();
   readonly measures = new MeasurePanel(FIT_ROWS);
   readonly warning = h('p', { class: 'warning', role: 'status', 'data-warning': '' });
   readonly setup: CloudSetup;
-  readonly options: CloudOptionControls;
+  readonly options: OptionControls<CloudViewOptions>;
   readonly photos: PhotoStrip;
   readonly tools: EditTools;
   readonly plots: Plots;
@@ -68,22 +73,25 @@ export class ReconstructParts extends RunParts<CloudExample> {
   #params: ParamValues = {};
 
   constructor(root: HTMLElement, history: History, client: ReconstructClient, signal: AbortSignal, events: PartEvents) {
-    super(root, signal, events, {
+    this.page = new LabPage(root, signal, events, {
       viewLabel: text('reconstruct.viewLabel'),
       drop: text('reconstruct.drop'),
       admission: 'any',
       data: cloudData(fileChooser(events.onFiles, ACCEPT, undefined, 'any'), events.onExample),
+    });
+    this.run = new RunControls(this.page, events, {
       history,
       fetchMesh: (request) => client.request('export', request),
       residual: 'residual',
     });
+    this.view = new ReconstructionView(this.page.canvas, INITIAL_VIEW);
     this.#events = events;
     this.setup = new CloudSetup(events.onChoice);
     this.tools = new EditTools((tool) => this.#setTool(tool !== 'none'), events.onTakeBack);
     this.plots = new Plots(history, [RESIDUAL_PLOT], false);
     this.timing = new TimingPanel(client, events.onError);
     this.#figure = new FigurePanel<CloudVariant, CloudPreset>(events.onVariant);
-    this.options = new CloudOptionControls(INITIAL_VIEW, (options) => {
+    this.options = cloudOptions(INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
       events.onOptions(options);
     });
@@ -94,23 +102,23 @@ export class ReconstructParts extends RunParts<CloudExample> {
       wideButton(text('reconstruct.openInExtract'), 'extract', events.onPassOn),
       wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt),
     ];
-    this.layOut({
+    this.page.layOut({
       name: 'reconstruct',
       options: this.options.element,
       over: [this.view.legend.element, this.view.editing.legend.element],
       beside: [this.photos.large],
-      stage: (view, status) => [view, this.transport.element, status, this.warning, this.photos.element],
+      stage: (view, status) => [view, this.run.transport.element, status, this.warning, this.photos.element],
       setup: [
-        section(text('reconstruct.points'), this.data.element, this.#figure.element, this.setup.element),
-        this.paramsSection(true),
+        section(text('reconstruct.points'), this.page.data.element, this.#figure.element, this.setup.element),
+        this.page.paramsSection(true),
         section(text('reconstruct.sectionEdits'), this.tools.element),
       ],
       results: [
         section(text('labs.sectionProgress'), this.phases.element),
-        section(text('labs.sectionSurface'), this.warnings.element, this.measures.element),
-        this.saveSection(this.view.subject, ...this.#uses),
-        ...this.finishSections(this.view.editing, this.measures),
-        section(text('labs.sectionPlots'), this.plots.element, this.#kernel.element, this.csv),
+        section(text('labs.sectionSurface'), this.page.warnings.element, this.measures.element),
+        this.run.saveSection(this.view.subject, ...this.#uses),
+        ...this.run.finishSections(this.view.editing, this.measures),
+        section(text('labs.sectionPlots'), this.plots.element, this.#kernel.element, this.run.csv),
         folded(text('reconstruct.sectionTiming'), this.timing.element),
       ],
     });
@@ -119,18 +127,18 @@ export class ReconstructParts extends RunParts<CloudExample> {
   /** Shows newly opened points with their cameras and facts. */
   adopt(cloud: Cloud, photographs: Photograph[], example: CloudExample | undefined, name: string): void {
     const { points, colors, normals, warnings } = cloud;
-    this.warnings.showData(warnings);
+    this.page.warnings.showData(warnings);
     this.#photographs = photographs;
-    this.saving.name = name;
+    this.page.saving.name = name;
     this.measures.unit = '';
     const cameras = photographs.map((one) => one.view);
     this.view.setCloud({ points, colors, cameras, up: example?.up ?? 'z', front: example?.front ?? 1 });
-    this.options.hasCameras = photographs.length > 0;
+    offerCameras(this.options, photographs.length > 0);
     this.photos.show(photographs);
     this.timing.clear();
     this.showChoice(undefined);
     const facts = { name, points: points.length / 3, colors: colors !== undefined, normals: normals !== undefined };
-    this.data.show(factsOf({ ...facts, cameras: photographs.length }), example);
+    this.page.data.show(factsOf({ ...facts, cameras: photographs.length }), example);
   }
 
   clearSurface(): void {
@@ -142,9 +150,9 @@ export class ReconstructParts extends RunParts<CloudExample> {
   /** Shows the parameters in force; hides the constants of kernels that are not in use. */
   showParams(params: ParamValues, preset: CloudPreset | undefined, variant: CloudVariant | undefined): void {
     this.#params = params;
-    this.displayParams(params);
+    this.page.showParams(params);
     const isMulti = params.kernel === 'multi-order';
-    this.hideParams({ sigma: params.kernel !== 'gaussian', delta: !isMulti, tau: !isMulti });
+    this.page.hideParams({ sigma: params.kernel !== 'gaussian', delta: !isMulti, tau: !isMulti });
     this.#figure.show(preset, variant);
     this.#showKernel();
   }
@@ -153,7 +161,7 @@ export class ReconstructParts extends RunParts<CloudExample> {
   showChoice(choice: ImplicitChoice | undefined): void {
     this.#choice = choice;
     const { sides: _, ...numbers } = { ...choice };
-    this.displayChosen(numbers);
+    this.page.showChosen(numbers);
     this.#showKernel();
   }
 
@@ -164,19 +172,19 @@ export class ReconstructParts extends RunParts<CloudExample> {
 
   /** Enables and disables controls; `surface`: whether there is a complete surface. */
   showState(state: LabState, beneath: LabState, ready: boolean, surface: boolean): void {
-    const idle = this.showRunState(state, beneath, ready, surface);
+    const idle = this.run.showState(state, beneath, ready, surface);
     this.timing.enabled = idle;
-    this.exports.enabled = surface;
+    this.run.exports.enabled = surface;
     for (const button of this.#uses) button.disabled = !surface;
   }
 
-  override dispose(): void {
-    super.dispose();
+  dispose(): void {
+    this.run.dispose();
     this.view.dispose();
   }
 
   #setTool(on: boolean): void {
-    this.root.toggleAttribute('data-placing', on);
+    this.page.root.toggleAttribute('data-placing', on);
     this.view.onPick = on ? this.#events.onPick : undefined;
   }
 

@@ -40,7 +40,7 @@ export class ReconstructResults {
       case 'progress':
         this.#history.add(event.reports);
         this.#showHistory();
-        if (this.#states.value === 'running') this.#ui.status.report(() => underWay(this.#history));
+        if (this.#states.value === 'running') this.#ui.page.status.report(() => underWay(this.#history));
         break;
       case 'surface':
         this.#takeSurface(event);
@@ -61,7 +61,7 @@ export class ReconstructResults {
    */
   showState(state: LabState): void {
     this.#showHistory();
-    this.#ui.status.say(this.describe(state));
+    this.#ui.page.status.say(this.describe(state));
     if (state === 'done' && this.#history.reports.at(-1)?.vertices === 0) this.#showNothing();
   }
 
@@ -104,7 +104,7 @@ export class ReconstructResults {
    */
   #takeSurface(event: SurfaceEvent): void {
     if (event.preview && this.#complete) {
-      this.#client.acknowledge();
+      this.#client.post({ kind: 'shown' });
       return;
     }
     this.#surface = event;
@@ -113,7 +113,7 @@ export class ReconstructResults {
       this.#framePending = 0;
       if (this.#surface) this.#ui.view.showSurface(this.#surface.surface);
       this.#surface = undefined;
-      this.#client.acknowledge();
+      this.#client.post({ kind: 'shown' });
     });
   }
 
@@ -126,11 +126,11 @@ export class ReconstructResults {
 
   #showHistory(): void {
     const last = this.#history.reports.at(-1);
-    this.#ui.transport.showReport(last && { ...last, progress: overallProgress(last) });
-    this.#ui.warnings.showReport(last);
+    this.#ui.run.transport.showReport(last && { ...last, progress: overallProgress(last) });
+    this.#ui.page.warnings.showReport(last);
     this.#ui.phases.update(this.#history, this.#states.value === 'running');
     this.#ui.plots.update();
-    this.#ui.csv.disabled = this.#history.reports.length === 0;
+    this.#ui.run.csv.disabled = this.#history.reports.length === 0;
   }
 
   /**
@@ -140,6 +140,6 @@ export class ReconstructResults {
   #showNothing(): void {
     this.#complete = false;
     this.#ui.clearSurface();
-    this.#ui.banner.show(text('reconstruct.noSurface'), text('reconstruct.noSurfaceHint'));
+    this.#ui.page.banner.show(text('reconstruct.noSurface'), text('reconstruct.noSurfaceHint'));
   }
 }

@@ -115,7 +115,7 @@ export class ReconstructSettings {
       if (!this.#cloud || !this.#states.canChange) return;
       const edits = applyClick(tool, hit, length, this.#edits, this.#cloud.points);
       if (edits) await this.#change({ edits }, text('reconstruct.editChange'));
-      else if (tool === 'remove') this.#ui.status.say(text('reconstruct.noPointsNear'));
+      else if (tool === 'remove') this.#ui.page.status.say(text('reconstruct.noPointsNear'));
     });
   }
 
@@ -154,7 +154,7 @@ export class ReconstructSettings {
       }
     } catch (error) {
       const { code, message } = toFailure(error);
-      this.#ui.refuseParam(name, message, this.#params);
+      this.#ui.page.refuseParam(name, message, this.#params);
       if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
     }
   }
@@ -178,7 +178,7 @@ export class ReconstructSettings {
 
   async #apply(settings: Settings): Promise<boolean> {
     const { choice, edits } = settings;
-    this.#ui.banner.hide();
+    this.#ui.page.banner.hide();
     try {
       const params = await this.#handOver(settings);
       this.#edits = edits;
@@ -219,7 +219,7 @@ export class ReconstructSettings {
   }
 
   #showUndo(): void {
-    this.#ui.transport.showUndo(this.#undo.undoable, this.#undo.redoable);
+    this.#ui.run.transport.showUndo(this.#undo.undoable, this.#undo.redoable);
   }
 
   #showEdits(): void {

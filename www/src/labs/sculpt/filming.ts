@@ -30,7 +30,7 @@ export class Filming {
       film && 'keys' in film ? film : { keys: [], between: this.#ui.film.between, loop: film?.loop ?? false };
     const keys = [...known.keys, pose];
     this.#change({ ...known, keys }, text('sculpt.newKeyframeChange'), known.between * (keys.length - 1));
-    this.#ui.status.say(text('sculpt.keyframeAdded', { number: keys.length }));
+    this.#ui.page.status.say(text('sculpt.keyframeAdded', { number: keys.length }));
   }
 
   removeKey(index: number): void {
@@ -65,11 +65,11 @@ export class Filming {
   async record(): Promise<void> {
     if (!this.#states.canChange) return;
     this.#ui.film.showRecording(0);
-    this.#ui.status.say(text('sculpt.recording'));
+    this.#ui.page.status.say(text('sculpt.recording'));
     try {
       const bytes = await this.#client.request('record', { frameSeconds: FRAME_SECONDS });
-      if (bytes) this.#ui.saving.bytes('film.glb', bytes, 'model/gltf-binary');
-      else this.#ui.status.say(text('sculpt.recordingCancelled'));
+      if (bytes) this.#ui.page.saving.bytes('film.glb', bytes, 'model/gltf-binary');
+      else this.#ui.page.status.say(text('sculpt.recordingCancelled'));
     } catch (error) {
       this.#states.fail(text('sculpt.recordingFailed'), error);
     }

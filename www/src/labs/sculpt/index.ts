@@ -1,19 +1,22 @@
 import { prefersReducedMotion } from '../../kit/dom';
 import { History } from '../../kit/history';
 import type { LabState } from '../../kit/state';
-import type { OpenInLab } from '../../lab/lab';
+import type { Lab, LabPlace } from '../../lab/lab';
 import { LinkError, readLink } from '../../lab/link-query';
+import { Opening } from '../../lab/opening';
+import { type RunningLab, Runs } from '../../lab/runs';
 import { contentOf } from '../../lab/session/content';
 import type { ContentOf } from '../../lab/session/schema';
-import { RunLab } from '../../lab/shell';
+import { LabShell } from '../../lab/shell';
 import { LabStates } from '../../lab/states';
 import { text } from '../../texts';
-import { SculptClient } from './client';
+import { connectSculpt } from './client';
+import { type OpenedPose, SculptData, type SculptOpening, type SculptSource } from './data';
 import type { SculptExample } from './examples';
 import { lastFrame } from './film';
 import { Filming } from './filming';
 import { filmOf, fits, fromHash, linkOf, toHash } from './link';
-import { type OpenedPose, SculptOpening, type SculptSource } from './opening';
+import { offerStages } from './panels/options';
 import { type PartEvents, SculptParts } from './parts';
 import { Posing } from './posing';
 import { isSculptPreset, poseOf, type SculptPreset, type SculptVariant, variantInForce } from './presets';
@@ -33,12 +36,15 @@ const QUANTITIES: readonly string[] = [
  * The Sculpt lab: a detailed surface is deformed by ellipsoids. Opening, settings, posing, filming and results are in
  * files of their own.
  */
-export class SculptLab extends RunLab<SculptExample> {
-  protected readonly id = 'sculpt';
-  protected readonly client = new SculptClient((event) => this.#onEvent(event));
-  protected readonly ui: SculptParts;
-  protected readonly states: LabStates;
-  protected readonly opening: SculptOpening;
+class SculptLab implements RunningLab<SculptExample> {
+  readonly shell: LabShell<SculptExample>;
+  readonly #runs: Runs<SculptExample>;
+
+  readonly id = 'sculpt';
+  readonly client = connectSculpt((event) => this.#onEvent(event));
+  readonly ui: SculptParts;
+  readonly states: LabStates;
+  readonly opening: SculptOpening;
   readonly #results: SculptResults;
   readonly #settings: SculptSettings;
   readonly #posing: Posing;
@@ -50,32 +56,44 @@ export class SculptLab extends RunLab<SculptExample> {
   #usual: ParamValues = {};
   #shown: FrameContents = { layout: 'result', quantity: undefined, textured: false };
 
-  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
-    super(root, help, passOn);
+  readonly escape = {
+    text: text('sculpt.dismissKey'),
+    act: () => {
+      if (this.ui.page.banner.shown) this.shell.dismiss();
+      else this.#settings.choose(undefined);
+    },
+  };
+
+  constructor(place: LabPlace) {
+    const shell = new LabShell(place, this);
+    const runs = new Runs(shell, this);
+    this.shell = shell;
+    this.#runs = runs;
     const { client } = this;
-    const { signal } = this.closing;
+    const { root, signal } = shell;
     const history = new History();
     const ui = new SculptParts(root, history, client, signal, this.#events());
-    const states = new LabStates(ui.banner, ui.status, signal);
+    const states = new LabStates(ui.page.banner, ui.page.status, signal);
     this.ui = ui;
     this.states = states;
     this.#results = new SculptResults(client, ui, states, history, (frame) => this.#follow(frame));
     this.#settings = new SculptSettings(client, ui, states, history, () => this.#showSettings());
-    this.#posing = new Posing(ui, this.#settings, () => this.work.did('shaped'));
+    this.#posing = new Posing(ui, this.#settings, () => this.shell.work.did('shaped'));
     this.#filming = new Filming(client, ui, states, this.#settings);
-    this.opening = new SculptOpening(client, ui, states, (opened, source) => this.#adopt(opened, source));
+    const data = new SculptData(client, states, (opened, source) => this.#adopt(opened, source));
+    this.opening = new Opening(client, ui.page, states, data);
     const addKey = () => this.#filming.addKey();
-    this.beginRuns([{ key: 'k', shown: 'k', text: text('sculpt.addKeyframeKey'), act: addKey }]);
+    runs.begin([{ key: 'k', shown: 'k', text: text('sculpt.addKeyframeKey'), act: addKey }]);
   }
 
-  protected override closed(): void {
+  closed(): void {
     this.#posing.close();
   }
 
   /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
-      ...this.runEvents(),
+      ...this.#runs.events(),
       onVariant: (preset, variant) => this.#openVariant(preset, variant),
       onChoose: (index) => this.#settings.choose(index),
       onMode: (mode) => {
@@ -91,7 +109,7 @@ export class SculptLab extends RunLab<SculptExample> {
       onSeek: (frame) => this.#filming.seek(frame),
       onRecord: () => void this.#filming.record(),
       onCancelRecord: () => void this.client.request('cancelRecord', undefined),
-      onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.ui.labelOf(name)),
+      onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.ui.page.labelOf(name)),
       onSupport: (support) => void this.#setSupport(support),
       onOptions: (options) => this.#setOptions(options),
     };
@@ -126,7 +144,7 @@ export class SculptLab extends RunLab<SculptExample> {
     const color = (linked?.color ?? example?.color ?? 'plain') as SculptViewOptions['color'];
     const layout = (linked?.layout ?? example?.layout ?? 'result') as SculptViewOptions['layout'];
     const preset = isSculptPreset(example) ? example : undefined;
-    this.ui.options.staged = preset?.stages !== undefined;
+    offerStages(this.ui.options, preset?.stages !== undefined);
     this.ui.options.set({
       color,
       layout: layout === 'stages' && !preset?.stages ? 'result' : layout,
@@ -151,8 +169,8 @@ export class SculptLab extends RunLab<SculptExample> {
     if (view) this.ui.view.pose = view.camera;
   }
 
-  protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {
-    const [moments, log] = await this.paused(async () => [
+  async sessionContent(): Promise<Record<string, unknown> | undefined> {
+    const [moments, log] = await this.#runs.paused(async () => [
       await this.#settings.moments(),
       await this.client.request('log', undefined),
     ]);
@@ -166,7 +184,7 @@ export class SculptLab extends RunLab<SculptExample> {
     };
   }
 
-  protected override linkLacks(): (string | false)[] {
+  linkLacks(): (string | false)[] {
     return [!fits(this.#settings.pose) && text('sculpt.linkLacksPose')];
   }
 
@@ -190,7 +208,7 @@ export class SculptLab extends RunLab<SculptExample> {
     const preset = isSculptPreset(example) ? example : undefined;
     this.ui.showParams(params, preset, preset && variantInForce(preset, pose, params, this.#usual));
     this.showControls(this.states.value);
-    this.updateAddress();
+    this.shell.updateAddress();
   }
 
   get #hasFilm(): boolean {
@@ -205,20 +223,20 @@ export class SculptLab extends RunLab<SculptExample> {
     const changed = layout !== before.layout || quantity !== before.quantity || textured !== before.textured;
     this.#shown = { layout, quantity, textured };
     if (!this.states.ready) return;
-    if (changed) this.ask(this.client.request('show', this.#shown));
+    if (changed) this.shell.ask(this.client.request('show', this.#shown));
     this.#results.showOriginals();
-    this.updateAddress();
+    this.shell.updateAddress();
   }
 
-  protected override get canPlay(): boolean {
+  get canPlay(): boolean {
     return this.states.canChange && (this.#hasFilm || this.states.modelState === 'paused');
   }
 
-  protected override get canStep(): boolean {
+  get canStep(): boolean {
     return this.states.canChange;
   }
 
-  protected override beforeRun(change: string): void {
+  beforeRun(change: string): void {
     this.#settings.checkpoint(change);
   }
 
@@ -229,23 +247,23 @@ export class SculptLab extends RunLab<SculptExample> {
   }
 
   /** Rebuilds the model, with the ellipsoids in the scene's start pose and the history of steps cleared. */
-  protected startOver(): Promise<void> {
+  startOver(): Promise<void> {
     return this.#build(this.#settings.support);
   }
 
   #build(support: Support): Promise<void> {
-    return this.building(async () => {
+    return this.#runs.building(async () => {
       await this.#settings.rebuild(support);
       this.#results.startOver();
       await this.client.request('show', this.#shown);
     });
   }
 
-  protected travel(way: 'undo' | 'redo'): Promise<void> {
+  travel(way: 'undo' | 'redo'): Promise<void> {
     return this.#settings.travel(way);
   }
 
-  protected address({ example, name: file }: SculptSource): string {
+  address({ example, name: file }: SculptSource): string {
     const { params, support, start, pose: present, posed, film } = this.#settings;
     const { color, layout } = this.ui.options.value;
     const pose = posed ? present : undefined;
@@ -253,33 +271,26 @@ export class SculptLab extends RunLab<SculptExample> {
   }
 
   #onEvent(event: WorkerEvent): void {
-    if (this.takes(event)) return;
+    if (this.#runs.takes(event)) return;
     if (event.event === 'recorded') this.ui.film.showRecording(event.progress);
     else if (event.event === 'frame') this.#results.take(event);
     else if (event.event === 'measured') this.#results.measured(event);
     else this.#settings.reject(event.pose, event.failure.message);
   }
 
-  protected settled(state: LabState): void {
+  settled(state: LabState): void {
     this.#results.showState(state);
   }
 
-  protected showControls(state: LabState): void {
+  showControls(state: LabState): void {
     const { modelState, ready } = this.states;
     this.ui.showState(state, modelState, ready, this.#hasFilm);
   }
 
-  protected describe(): string {
+  describe(): string {
     return this.#results.describe(this.states.value);
   }
-
-  /** Dismisses the error message, else deselects the ellipsoid. */
-  protected override escape(): void {
-    if (this.ui.banner.shown) this.dismiss();
-    else this.#settings.choose(undefined);
-  }
-
-  protected override get escapeText(): string {
-    return text('sculpt.dismissKey');
-  }
 }
+
+/** Makes the Sculpt lab. */
+export const openSculpt = (place: LabPlace): Lab => new SculptLab(place).shell;

@@ -7,7 +7,9 @@ import type { History } from '../../kit/history';
 import { MeasurePanel } from '../../kit/measures';
 import { Plots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
-import { type RunEvents, RunParts } from '../../lab/parts';
+import { OptionControls } from '../../kit/view-options';
+import { LabPage } from '../../lab/page';
+import { RunControls, type RunEvents } from '../../lab/run-controls';
 import { text } from '../../texts';
 import { SurfaceCarrier } from './carrier';
 import type { SculptClient } from './client';
@@ -18,7 +20,7 @@ import { ACCEPT } from './mesh-files';
 import { factsOf, sceneData } from './page';
 import { EllipsoidControls, type EllipsoidEvents } from './panels/ellipsoids';
 import { FilmControls, type FilmEvents } from './panels/film';
-import { SculptOptionControls } from './panels/options';
+import { offerLayouts, offerTexture, SCULPT_OPTIONS } from './panels/options';
 import { SupportControl } from './panels/support';
 import { pictureOf } from './picture';
 import { posesOf, type SculptPreset, type SculptVariant } from './presets';
@@ -37,13 +39,16 @@ export interface PartEvents extends RunEvents<SculptExample>, EllipsoidEvents, F
 }
 
 /** Controls and views of the Sculpt lab. */
-export class SculptParts extends RunParts<SculptExample> {
-  readonly view = new SculptureView(this.canvas, INITIAL_VIEW);
-  readonly carrier = new SurfaceCarrier(this.view);
+export class SculptParts {
+  readonly page: LabPage<SculptExample>;
+  readonly run: RunControls;
+
+  readonly view: SculptureView;
+  readonly carrier: SurfaceCarrier;
   readonly latency = new DragLatency();
   readonly measures = new MeasurePanel(SCULPT_ROWS);
   readonly previewNote = h('p', { class: 'coarse', hidden: true }, text('sculpt.coarsePreview'));
-  readonly options: SculptOptionControls;
+  readonly options: OptionControls<SculptViewOptions>;
   readonly ellipsoids: EllipsoidControls;
   readonly film: FilmControls;
   readonly support: SupportControl;
@@ -56,42 +61,46 @@ export class SculptParts extends RunParts<SculptExample> {
   #texture: Texture | undefined;
 
   constructor(root: HTMLElement, history: History, client: SculptClient, signal: AbortSignal, events: PartEvents) {
-    super(root, signal, events, {
+    this.page = new LabPage(root, signal, events, {
       viewLabel: text('sculpt.viewLabel'),
       drop: text('sculpt.drop'),
       admission: 'any',
       data: sceneData(fileChooser(events.onFiles, ACCEPT, undefined, 'any'), events.onExample),
+    });
+    this.run = new RunControls(this.page, events, {
       history,
       fetchMesh: (request) => client.request('export', request),
       residual: 'unrest',
     });
+    this.view = new SculptureView(this.page.canvas, INITIAL_VIEW);
+    this.carrier = new SurfaceCarrier(this.view);
     this.#onError = events.onError;
     this.#figure = new FigurePanel<SculptVariant, SculptPreset>(events.onVariant);
     this.ellipsoids = new EllipsoidControls(events);
     this.film = new FilmControls(events);
     this.support = new SupportControl(events.onSupport);
     this.plots = new Plots(history, SCULPT_PLOTS, true);
-    this.options = new SculptOptionControls(INITIAL_VIEW, (options) => {
+    this.options = new OptionControls(SCULPT_OPTIONS, INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
       events.onOptions(options);
     });
     this.view.onCaptions = (captions) => this.#showCaptions(captions);
-    this.layOut({
+    this.page.layOut({
       name: 'sculpt',
       options: this.options.element,
       over: [this.view.legend.element, this.view.editing.legend.element, this.previewNote, this.#captions],
-      stage: (view, status) => [view, this.transport.element, status],
+      stage: (view, status) => [view, this.run.transport.element, status],
       setup: [
-        section(text('sculpt.sectionScene'), this.data.element, this.support.element, this.#figure.element),
+        section(text('sculpt.sectionScene'), this.page.data.element, this.support.element, this.#figure.element),
         section(text('sculpt.sectionEllipsoids'), this.ellipsoids.element),
         section(text('sculpt.sectionFilm'), this.film.element),
-        this.paramsSection(),
+        this.page.paramsSection(),
       ],
       results: [
-        section(text('labs.sectionSurface'), this.warnings.element, this.measures.element),
-        this.saveSection(this.view.subject),
-        ...this.finishSections(this.view.editing, this.measures),
-        section(text('labs.sectionPlots'), this.plots.element, this.csv),
+        section(text('labs.sectionSurface'), this.page.warnings.element, this.measures.element),
+        this.run.saveSection(this.view.subject),
+        ...this.run.finishSections(this.view.editing, this.measures),
+        section(text('labs.sectionPlots'), this.plots.element, this.run.csv),
       ],
     });
   }
@@ -103,13 +112,13 @@ export class SculptParts extends RunParts<SculptExample> {
     name: string,
     known: readonly Warning[] = [],
   ): void {
-    this.saving.name = example?.id ?? name;
-    this.warnings.showData(known, warnings);
+    this.page.saving.name = example?.id ?? name;
+    this.page.warnings.showData(known, warnings);
     this.measures.unit = '';
     this.support.hasChoice = hasChoice;
     this.view.setScene(box, example?.up ?? 'y', start, [pose, ...posesOf(example)]);
     this.#showTexture(texture);
-    this.data.show(factsOf({ name, detail, bands, buildMs }), example);
+    this.page.data.show(factsOf({ name, detail, bands, buildMs }), example);
   }
 
   /** Decodes and shows a texture. If that fails, the surface stays without one. */
@@ -119,7 +128,7 @@ export class SculptParts extends RunParts<SculptExample> {
     this.view.texture = null;
     this.#texture?.dispose();
     this.#texture = undefined;
-    this.options.textured = texture !== undefined;
+    offerTexture(this.options, texture !== undefined);
     if (!texture) return;
     pictureOf(texture).then(
       (picture) => {
@@ -133,12 +142,12 @@ export class SculptParts extends RunParts<SculptExample> {
 
   showSupport(support: Support): void {
     this.support.show(support);
-    this.options.membrane = support === 'membrane';
-    this.hideParams(Object.fromEntries(OF_MEMBRANES.map((name) => [name, support === 'surface'])));
+    offerLayouts(this.options, support === 'membrane');
+    this.page.hideParams(Object.fromEntries(OF_MEMBRANES.map((name) => [name, support === 'surface'])));
   }
 
   showParams(params: ParamValues, preset: SculptPreset | undefined, variant: SculptVariant | undefined): void {
-    this.displayParams(params);
+    this.page.showParams(params);
     this.#figure.show(preset, variant);
   }
 
@@ -147,13 +156,13 @@ export class SculptParts extends RunParts<SculptExample> {
    * even when the model has converged.
    */
   showState(state: LabState, beneath: LabState, ready: boolean, canPlay: boolean): void {
-    const idle = this.showRunState(state, beneath === 'done' && canPlay ? 'paused' : beneath, ready);
+    const idle = this.run.showState(state, beneath === 'done' && canPlay ? 'paused' : beneath, ready);
     // Saving pauses a run, which would then not go on to the same pose.
-    this.session.enabled = idle && beneath !== 'running';
+    this.page.session.enabled = idle && beneath !== 'running';
   }
 
-  override dispose(): void {
-    super.dispose();
+  dispose(): void {
+    this.run.dispose();
     this.#texture?.dispose();
     this.view.dispose();
   }

@@ -56,7 +56,7 @@ export class Posing {
     this.#mode = mode;
     this.#ui.ellipsoids.mode = mode;
     this.#ui.view.mode = mode;
-    this.#ui.status.say(text(MODE_TEXTS[mode]));
+    this.#ui.page.status.say(text(MODE_TEXTS[mode]));
   }
 
   /** Replaces the selected ellipsoid by one entered as numbers; `what` names the change. */
@@ -95,7 +95,7 @@ export class Posing {
     this.#settings.checkpoint(text('sculpt.removedEllipsoidChange'));
     this.#settings.send(others(pose), false, others(names));
     this.#settings.choose(undefined);
-    this.#ui.status.say(text('sculpt.ellipsoidRemoved', { name }));
+    this.#ui.page.status.say(text('sculpt.ellipsoidRemoved', { name }));
     this.#ui.ellipsoids.focus();
   }
 
@@ -133,7 +133,7 @@ export class Posing {
     if (chosen === undefined || !ellipsoid) return;
     const { size } = this.#ui.view;
     const centre = place(shortenedPoint(ellipsoid.center, 3, size), size);
-    this.#ui.status.say(text('sculpt.ellipsoidMoved', { name: this.#settings.nameOf(chosen), what, centre }));
+    this.#ui.page.status.say(text('sculpt.ellipsoidMoved', { name: this.#settings.nameOf(chosen), what, centre }));
   }
 
   /**

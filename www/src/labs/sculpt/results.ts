@@ -68,7 +68,7 @@ export class SculptResults {
   /** Displays a frame of the model at the browser's next animation frame; only then does the worker continue. */
   take(frame: FrameEvent): void {
     this.#history.add(frame.reports);
-    if (this.#states.value === 'running') this.#ui.status.report(() => underWay(this.#history));
+    if (this.#states.value === 'running') this.#ui.page.status.report(() => underWay(this.#history));
     const isPending = this.#frame !== undefined;
     this.#frame = frame;
     if (!isPending) this.#ui.view.change(() => this.#showPending());
@@ -79,7 +79,7 @@ export class SculptResults {
     if (!frame) return;
     this.#frame = undefined;
     this.#show(frame);
-    this.#client.acknowledge(frame.serial);
+    this.#client.post({ kind: 'shown', serial: frame.serial });
   }
 
   /** Displays measures, after the frame they belong to; the state that follows them thus finds both displayed. */
@@ -94,7 +94,7 @@ export class SculptResults {
   showState(state: LabState): void {
     if (state === 'paused' || state === 'done') this.#ui.carrier.stop();
     this.#showHistory();
-    this.#ui.status.say(this.describe(state));
+    this.#ui.page.status.say(this.describe(state));
   }
 
   /** Returns the text for the status line in a state of the lab. */
@@ -168,9 +168,9 @@ export class SculptResults {
   #showHistory(): void {
     this.#shownAt = performance.now();
     const last = this.#history.reports.at(-1);
-    this.#ui.transport.showReport(last);
-    this.#ui.warnings.showReport(last);
+    this.#ui.run.transport.showReport(last);
+    this.#ui.page.warnings.showReport(last);
     this.#ui.plots.update();
-    this.#ui.csv.disabled = this.#history.reports.length === 0;
+    this.#ui.run.csv.disabled = this.#history.reports.length === 0;
   }
 }

@@ -72,7 +72,7 @@ export class SculptSettings {
     this.#undo = new UndoHistory<PageState, SavedPose>(
       client,
       () => ({ names: this.#names, posed: this.#posed, film: this.#film, mark: history.marker() }),
-      (undoable, redoable) => ui.transport.showUndo(undoable, redoable),
+      (undoable, redoable) => ui.run.transport.showUndo(undoable, redoable),
     );
   }
 
@@ -138,7 +138,7 @@ export class SculptSettings {
   choose(index: number | undefined): void {
     const chosen = index !== undefined && index < this.#pose.length ? index : undefined;
     if (chosen !== this.#chosen)
-      this.#ui.status.say(
+      this.#ui.page.status.say(
         chosen === undefined ? text('sculpt.noneSelected') : text('sculpt.selected', { name: this.nameOf(chosen) }),
       );
     this.#chosen = chosen;
@@ -160,11 +160,12 @@ export class SculptSettings {
    */
   send(pose: Pose, dragging: boolean, names = this.#names): void {
     if (!this.#states.canChange) return;
-    this.#ui.banner.hide();
+    this.#ui.page.banner.hide();
     this.#pose = pose;
     this.#names = named(names, pose.length);
     this.#posed = true;
-    this.#poseId = this.#client.pose(pose, dragging);
+    this.#poseId += 1;
+    this.#client.post({ kind: 'pose', pose, poseId: this.#poseId, dragging });
     this.#measureLatency(dragging);
     if (this.#chosen !== undefined && this.#chosen >= pose.length) this.#chosen = undefined;
     this.#showPose();
@@ -240,7 +241,7 @@ export class SculptSettings {
         const { code, message } = toFailure(error);
         if (code === 'internal') this.#states.fail(text('labs.requestFailed'), error);
         this.show();
-        this.#ui.refuseParam(Object.keys(values)[0] ?? '', message, this.#params);
+        this.#ui.page.refuseParam(Object.keys(values)[0] ?? '', message, this.#params);
         return;
       }
       this.show();

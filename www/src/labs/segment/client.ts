@@ -8,9 +8,8 @@ import type { Requests, WorkerEvent } from './protocol';
 export const spawnSegment = () =>
   new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle segment' });
 
-/** The page's client of the Segment lab's worker: sends requests to it and receives its replies and events. */
-export class SegmentClient extends Channel<Requests, WorkerEvent> {
-  constructor(onEvent: (event: WorkerEvent) => void) {
-    super(spawnSegment, onEvent);
-  }
-}
+/** Connects the page to that worker. */
+export const connectSegment = (onEvent: (event: WorkerEvent) => void) =>
+  new Channel<Requests, WorkerEvent>(spawnSegment, onEvent);
+
+export type SegmentClient = ReturnType<typeof connectSegment>;

@@ -5,19 +5,20 @@ import { nameOf, readFiles } from '../../importers/files';
 
 import type { Shortcut } from '../../kit/shortcuts';
 import type { LabState } from '../../kit/state';
-import type { OpenInLab } from '../../lab/lab';
+import type { Lab, LabPlace } from '../../lab/lab';
+import { Opening } from '../../lab/opening';
 import { contentOf } from '../../lab/session/content';
 import type { ContentOf } from '../../lab/session/schema';
-import { LabShell } from '../../lab/shell';
+import { LabShell, type ShelledLab } from '../../lab/shell';
 import { LabStates } from '../../lab/states';
 import { spaceOf, unitOf } from '../../lab/surface-space';
 import { plural, text } from '../../texts';
-import { SegmentClient } from './client';
+import { connectSegment } from './client';
+import { SegmentData, type SegmentOpening, type SegmentSource } from './data';
 import { SegmentEditing } from './editing';
 import type { SegmentExample } from './examples';
 import type { Overlays } from './label-overlay';
 import { INITIAL_VIEW, linkOf, toHash } from './link';
-import { SegmentOpening, type SegmentSource } from './opening';
 import { factsOf, MAP_FACT } from './page';
 import type { LabelMeasures } from './panels/label-measures';
 import { type Tool, type ToolSettings, usesRange } from './panels/tools';
@@ -46,12 +47,15 @@ const NO_OVERLAYS: Pick<Overlays, 'colors' | 'names' | 'paint' | 'mask'> = {
  * The Segment lab: labels are painted on slices, and their surfaces follow. Opening, editing and saving are in files of
  * their own.
  */
-export class SegmentLab extends LabShell<SegmentExample> {
-  protected readonly id = 'segment';
-  protected readonly client = new SegmentClient((event) => this.#onEvent(event));
-  protected readonly ui: SegmentParts;
-  protected readonly states: LabStates;
-  protected readonly opening: SegmentOpening;
+class SegmentLab implements ShelledLab<SegmentExample> {
+  readonly shell: LabShell<SegmentExample>;
+
+  readonly id = 'segment';
+  readonly client = connectSegment((event) => this.#onEvent(event));
+  readonly ui: SegmentParts;
+  readonly states: LabStates;
+  readonly opening: SegmentOpening;
+  readonly #data: SegmentData;
   readonly #editing: SegmentEditing;
   readonly #measures = new Map<number, LabelMeasures>();
   #volume: VolumeView | undefined;
@@ -74,18 +78,19 @@ export class SegmentLab extends LabShell<SegmentExample> {
   /** Number of times that surfaces were shown. */
   #updates = 0;
 
-  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
-    super(root, help, passOn);
-    const { signal } = this.closing;
+  constructor(place: LabPlace) {
+    const shell = new LabShell(place, this);
+    this.shell = shell;
+    const { root, signal } = shell;
     const ui = new SegmentParts(root, signal, this.#events());
-    const states = new LabStates(ui.banner, ui.status, signal);
+    const states = new LabStates(ui.page.banner, ui.page.status, signal);
     this.ui = ui;
     this.states = states;
     this.#editing = new SegmentEditing(this.client, {
       onLabels: () => this.#showLabels(),
       onVoxels: () => ui.view.showLabels(),
       onUpdate: (update, smooth) => {
-        ui.warnings.showReport(update);
+        ui.page.warnings.showReport(update);
         this.#take(update, smooth);
       },
       onBusy: () => {
@@ -96,44 +101,45 @@ export class SegmentLab extends LabShell<SegmentExample> {
       onNothing: (reason) => {
         this.#isUnfilled = true;
         this.#released = undefined;
-        ui.status.say(reason);
+        ui.page.status.say(reason);
       },
       onUndo: (undoable, redoable) => {
-        if (undoable) this.work.did('painted');
-        else this.work.settled('painted');
+        if (undoable) this.shell.work.did('painted');
+        else this.shell.work.settled('painted');
         ui.tools.showUndo(undoable, redoable);
       },
       onError: (title, error) => {
         clearTimeout(this.#busyTimer);
         clearTimeout(this.#cancelTimer);
-        ui.offerCancel(false);
+        ui.page.offerCancel(false);
         states.fail(title, error);
       },
     });
-    this.opening = new SegmentOpening(this.client, ui, states, {
+    this.#data = new SegmentData(this.client, {
       adopt: (opened, source, reopening) => this.#adopt(opened, source, reopening),
       labels: () => this.#editing.voxels?.slice(),
     });
+    this.opening = new Opening(this.client, ui.page, states, this.#data);
     this.#applyTool(ui.tools.value);
-    this.begin(this.#shortcuts());
+    shell.begin(this.#shortcuts());
   }
 
-  protected override closed(): void {
+  closed(): void {
     clearTimeout(this.#maskTimer);
     clearTimeout(this.#busyTimer);
     clearTimeout(this.#cancelTimer);
-    delete this.root.dataset.tool;
+    delete this.shell.root.dataset.tool;
   }
 
   /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
-      ...this.labEvents(),
+      ...this.shell.events(),
       onCancel: () => this.#cancel(),
       onMapFiles: (files) => void this.#openLabels(files),
       onParam: (name, value) => void this.#setParam(name, value),
       onOptions: () => this.#optionsChanged(),
-      onSaveMap: (format) => this.ask(this.#saveMap(format), text('segment.saveFailed')),
+      onSaveMap: (format) => this.shell.ask(this.#saveMap(format), text('segment.saveFailed')),
       onSaveSurfaces: (format) => this.#saveSurfaces(format),
       onReset: () => void this.#reset(),
       onActive: (value) => this.#editing.setActive(value),
@@ -184,10 +190,10 @@ export class SegmentLab extends LabShell<SegmentExample> {
     const before = [this.#volume?.voxels, this.#editing.voxels];
     this.states.ready = true;
     this.#volume = volume;
-    this.ui.saving.name = example?.id ?? name;
+    this.ui.page.saving.name = example?.id ?? name;
     this.#params = params;
-    this.ui.data.show(factsOf(opened, example), example);
-    this.ui.unit = example?.unit ?? unitOf(volume);
+    this.ui.page.data.show(factsOf(opened, example), example);
+    this.ui.page.unit = example?.unit ?? unitOf(volume);
     this.ui.showParams(params);
     this.#forgetMask();
     this.ui.view.setVolume(volume, { dims: volume.dims, voxels, ...NO_OVERLAYS });
@@ -207,13 +213,13 @@ export class SegmentLab extends LabShell<SegmentExample> {
   #resume(opened: OpenedImage, { tools, view, ...list }: ContentOf<'segment'>): void {
     this.#editing.resume(opened.volume, opened, list);
     if (tools) this.ui.tools.set(tools);
-    this.ui.data.setFact(MAP_FACT, text('segment.sessionMap'));
+    this.ui.page.data.setFact(MAP_FACT, text('segment.sessionMap'));
     if (!view) return;
     this.ui.options.set(view.options);
     this.ui.view.pose = view;
   }
 
-  protected override async sessionContent(): Promise<Record<string, unknown>> {
+  async sessionContent(): Promise<Record<string, unknown>> {
     while (this.#editing.isBusy) await this.#editing.followed;
     const { labels, active, hidden, voxels } = this.#editing;
     const copy = voxels?.slice();
@@ -226,7 +232,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   /** Opens a label map of the open volume in place of the present one. */
   async #openLabels(files: File[]): Promise<void> {
     const volume = this.#volume;
-    if (!volume || !this.states.canChange || !(await this.mayReplace())) return;
+    if (!volume || !this.states.canChange || !(await this.shell.mayReplace())) return;
     const name = nameOf(files);
     this.states.load(text('labs.opening', { name }));
     try {
@@ -237,7 +243,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
       this.#editing.adopt(volume, opened, []);
       release(before);
       this.#applyTool(this.ui.tools.value);
-      this.ui.data.setFact(MAP_FACT, opened.labelFile ?? name);
+      this.ui.page.data.setFact(MAP_FACT, opened.labelFile ?? name);
       this.#showAll(opened);
     } catch (error) {
       this.states.fail(text('labs.openFailed', { name }), error);
@@ -245,7 +251,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   }
 
   #showAll(opened: OpenedLabels): void {
-    this.ui.warnings.showData(opened.warnings);
+    this.ui.page.warnings.showData(opened.warnings);
     this.#measures.clear();
     this.#released = undefined;
     this.#latency = {};
@@ -264,7 +270,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
       this.#isCancelled = true;
       this.states.load(text('labs.cancelling'));
       void this.opening.cancel().then(() => {
-        if (this.states.value === 'done') this.ui.status.say(text('segment.stopped'));
+        if (this.states.value === 'done') this.ui.page.status.say(text('segment.stopped'));
       });
     }, CANCEL_AFTER);
   }
@@ -272,7 +278,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   #stopped(): void {
     clearTimeout(this.#busyTimer);
     clearTimeout(this.#cancelTimer);
-    this.ui.offerCancel(false);
+    this.ui.page.offerCancel(false);
     this.#showMeasures();
     const { value } = this.states;
     if (value === 'running' || value === 'loading') this.states.idle(text('segment.stopped'), 'done');
@@ -294,8 +300,8 @@ export class SegmentLab extends LabShell<SegmentExample> {
     clearTimeout(this.#busyTimer);
     this.#busyTimer = window.setTimeout(() => {
       if (this.states.value !== 'running') return;
-      this.ui.status.say(what);
-      this.ui.offerCancel(true);
+      this.ui.page.status.say(what);
+      this.ui.page.offerCancel(true);
     }, SAID_AFTER);
   }
 
@@ -304,11 +310,11 @@ export class SegmentLab extends LabShell<SegmentExample> {
     if (this.#editing.isBusy) return;
     clearTimeout(this.#busyTimer);
     clearTimeout(this.#cancelTimer);
-    this.ui.offerCancel(false);
+    this.ui.page.offerCancel(false);
     if (this.#released !== undefined) this.#latency = { ...this.#latency, smooth: performance.now() - this.#released };
     this.#released = undefined;
     this.#showMeasures();
-    if (this.states.setModelState('done')) this.ui.status.say(this.describe());
+    if (this.states.setModelState('done')) this.ui.page.status.say(this.describe());
   }
 
   #show({ surfaces }: SurfaceUpdate): void {
@@ -323,7 +329,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   }
 
   #showMeasures(): void {
-    this.ui.measures.show(this.#editing.labels, this.#measures, this.ui.unit, {
+    this.ui.measures.show(this.#editing.labels, this.#measures, this.ui.page.unit, {
       latency: this.#latency,
       updates: this.#updates,
     });
@@ -364,7 +370,7 @@ export class SegmentLab extends LabShell<SegmentExample> {
   #apply(): void {
     const { view, tools } = this.ui;
     if (!this.states.canChange) return;
-    if (tools.value.tool === 'navigate') this.ui.status.say(text('segment.applyNothing'));
+    if (tools.value.tool === 'navigate') this.ui.page.status.say(text('segment.applyNothing'));
     else {
       this.#latency = {};
       this.#released = performance.now();
@@ -388,14 +394,14 @@ export class SegmentLab extends LabShell<SegmentExample> {
     const voxel = Math.min(...(this.#volume?.spacing ?? [1]));
     const hasBrush = tool === 'brush' || tool === 'threshold' || tool === 'eraser';
     // Half a voxel more, as the brush covers.
-    this.ui?.view.setBrush(hasBrush ? { radius: (radius + 0.5) * voxel, disc: shape === 'disc' } : undefined);
-    this.root.dataset.tool = tool;
+    this.ui.view.setBrush(hasBrush ? { radius: (radius + 0.5) * voxel, disc: shape === 'disc' } : undefined);
+    this.shell.root.dataset.tool = tool;
     this.#followRange(settings);
   }
 
   /** Asks the worker which voxels are in the range of intensities, if the tool in use needs that, and it is another one. */
   #followRange(settings: ToolSettings): void {
-    if (!this.#editing || !this.states.ready) return;
+    if (!this.states.ready) return;
     const { range } = settings;
     const wanted = range.join(' ');
     const isKnown = wanted === this.#maskRange;
@@ -438,16 +444,16 @@ export class SegmentLab extends LabShell<SegmentExample> {
         const { code, message } = toFailure(error);
         if (code === 'internal') this.states.fail(text('labs.requestFailed'), error);
         this.ui.showParams(this.#params);
-        this.ui.refuseParam(name, message);
+        this.ui.page.refuseParam(name, message);
       }
     });
   }
 
   #optionsChanged(): void {
-    if (this.states?.ready) this.updateAddress();
+    if (this.states.ready) this.shell.updateAddress();
   }
 
-  protected describe(): string {
+  describe(): string {
     const present = [...this.#measures.values()].filter(({ voxels }) => voxels > 0);
     if (present.length === 0) return text('segment.nothingLabelled');
     const labels = plural('segment.surfaces', present.length);
@@ -460,41 +466,50 @@ export class SegmentLab extends LabShell<SegmentExample> {
     this.states.fail(text('labs.requestFailed'), new RequestError(failure));
   }
 
-  protected showControls(state: LabState): void {
+  showControls(state: LabState): void {
     this.ui.showState(state, this.states.ready);
   }
 
-  protected address({ example, name: file }: SegmentSource): string {
-    const { defaults } = this.opening;
+  address({ example, name: file }: SegmentSource): string {
+    const { defaults } = this.#data;
     return toHash(linkOf({ example, file, params: this.#params, defaults, view: this.ui.options.value }));
   }
 
-  protected override linkLacks(): string[] {
+  linkLacks(): string[] {
     return [text('segment.linkLacksLabels')];
   }
 
   async #saveMap(format: Parameters<typeof saveMap>[0]): Promise<void> {
-    await saveMap(format, this.client, this.ui.saving, this.#editing.labels);
-    this.work.settled('painted');
+    await saveMap(format, this.client, this.ui.page.saving, this.#editing.labels);
+    this.shell.work.settled('painted');
   }
 
   #saveSurfaces(format: SurfaceFormat, recentre = false): void {
     this.ui.offer.hide();
     const surfaces = this.ui.view.surfaces();
-    const space = this.#volume ? spaceOf(this.#volume, this.ui.unit) : {};
-    const saving = saveSurfaces({ format, recentre, ...space }, this.client, this.ui, this.#editing.labels, surfaces);
+    const space = this.#volume ? spaceOf(this.#volume, this.ui.page.unit) : {};
+    const saving = saveSurfaces(
+      { format, recentre, ...space },
+      this.client,
+      this.ui.page,
+      this.#editing.labels,
+      surfaces,
+    );
     const offering = saving.catch((error) => {
       const [first] = surfaces.values();
       if (toFailure(error).code !== 'precision' || !first) throw error;
       this.ui.offer.show(format, first.origin, () => this.#saveSurfaces(format, true));
     });
-    this.ask(offering, text('segment.saveFailed'));
+    this.shell.ask(offering, text('segment.saveFailed'));
   }
 
   /** Opens volume and label map again; after a failure of the engine, with the present labels. */
   async #reset(): Promise<void> {
     const { source } = this.opening;
     if (this.states.engineBroken) await this.opening.reopen();
-    else if (this.states.canChange && source && (await this.mayReplace())) await this.opening.again();
+    else if (this.states.canChange && source && (await this.shell.mayReplace())) await this.opening.open(source);
   }
 }
+
+/** Makes the Segment lab. */
+export const openSegment = (place: LabPlace): Lab => new SegmentLab(place).shell;

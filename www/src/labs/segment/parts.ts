@@ -3,7 +3,7 @@ import { h, section, wideButton } from '../../kit/dom';
 import { RecentreOffer } from '../../kit/exports';
 import type { LabState } from '../../kit/state';
 import { OptionControls } from '../../kit/view-options';
-import { type LabEvents, LabParts } from '../../lab/parts';
+import { type LabEvents, LabPage } from '../../lab/page';
 import { text } from '../../texts';
 import type { SegmentExample } from './examples';
 import { INITIAL_VIEW } from './link';
@@ -39,7 +39,9 @@ const SURFACE_FORMATS: { format: SurfaceFormat; help: string }[] = [
 ];
 
 /** Controls and views of the Segment lab. */
-export class SegmentParts extends LabParts<SegmentExample> {
+export class SegmentParts {
+  readonly page: LabPage<SegmentExample>;
+
   readonly #slices = h('div', { class: 'slices' });
   readonly view: SegmentView;
   readonly measures = new LabelMeasureTable();
@@ -54,20 +56,20 @@ export class SegmentParts extends LabParts<SegmentExample> {
       fileChooser(events.onFiles, undefined, text('segment.openVolume'), 'labelled'),
       fileChooser(events.onMapFiles, undefined, text('segment.openMap')),
     ];
-    super(root, signal, events, {
+    this.page = new LabPage(root, signal, events, {
       viewLabel: text('segment.viewLabel'),
       drop: text('segment.drop'),
       admission: 'labelled',
       data: segmentData(choosers, events.onExample),
       sessionHelp: text('segment.sessionHelp'),
     });
-    this.view = new SegmentView(this.canvas, this.#slices, INITIAL_VIEW, events);
+    this.view = new SegmentView(this.page.canvas, this.#slices, INITIAL_VIEW, events);
     this.options = new OptionControls(SEGMENT_OPTIONS, INITIAL_VIEW, (options) => {
       this.view.setOptions(options);
       events.onOptions();
     });
     this.labels = new LabelList(events);
-    this.warnings.actions = { label: (label) => events.onActive(label), point: (point) => this.view.goTo(point) };
+    this.page.warnings.actions = { label: (label) => events.onActive(label), point: (point) => this.view.goTo(point) };
     this.tools = new SegmentTools(events);
     const maps = MAP_FORMATS.map(({ format, label, help }) =>
       button(label, help, { 'data-map': format }, () => events.onSaveMap(format)),
@@ -80,36 +82,36 @@ export class SegmentParts extends LabParts<SegmentExample> {
     reset.title = text('segment.resetHelp');
     const exported = (help: string, ...buttons: HTMLElement[]) =>
       h('div', {}, h('div', { class: 'buttons exports' }, ...buttons), h('p', { class: 'help' }, help));
-    this.layOut({
+    this.page.layOut({
       name: 'segment',
       options: this.options.element,
       stage: (view, status) => [this.tools.bar, h('div', { class: 'four' }, view, this.#slices), status],
       setup: [
         section(text('segment.sectionLabels'), this.labels.element),
         section(text('segment.sectionTool'), this.tools.settings),
-        section(text('segment.sectionVolume'), this.data.element, reset),
-        this.paramsSection(),
+        section(text('segment.sectionVolume'), this.page.data.element, reset),
+        this.page.paramsSection(),
       ],
       results: [
-        section(text('segment.sectionMeasures'), this.warnings.element, this.measures.element),
+        section(text('segment.sectionMeasures'), this.page.warnings.element, this.measures.element),
         section(text('segment.sectionMap'), exported(text('segment.mapsHelp'), ...maps)),
         section(
           text('segment.sectionSurfaces'),
           exported(text('segment.surfacesHelp'), ...surfaces),
           this.offer.element,
         ),
-        this.saveSection(this.view.subject),
+        this.page.saveSection(this.view.subject),
       ],
     });
   }
 
   showParams(params: ParamValues): void {
-    this.displayParams(params);
+    this.page.showParams(params);
   }
 
   /** Enables and disables controls according to the lab's state. `ready`: whether there is a label map. */
   showState(state: LabState, ready: boolean): void {
-    const idle = this.showLoading(state, ready);
+    const idle = this.page.showLoading(state, ready);
     this.tools.enabled = idle;
     for (const save of this.#saves) save.disabled = !idle;
     if (!idle) this.offer.hide();

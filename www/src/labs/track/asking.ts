@@ -152,7 +152,7 @@ export class TrackAsking {
       return;
     }
     this.#toggled();
-    if (isInForce) this.#ui.status.say(text('labs.cancelled'));
+    if (isInForce) this.#ui.page.status.say(text('labs.cancelled'));
   }
 
   #refuse(error: unknown, query: ObjectQuery): void {

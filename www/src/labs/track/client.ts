@@ -7,9 +7,8 @@ import type { Requests, WorkerEvent } from './protocol';
 export const spawnTrack = () =>
   new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: 'vesicle track' });
 
-/** The page's client of the Track lab's worker: sends requests to it and receives its replies and events. */
-export class TrackClient extends Channel<Requests, WorkerEvent> {
-  constructor(onEvent: (event: WorkerEvent) => void) {
-    super(spawnTrack, onEvent);
-  }
-}
+/** Connects the page to that worker. */
+export const connectTrack = (onEvent: (event: WorkerEvent) => void) =>
+  new Channel<Requests, WorkerEvent>(spawnTrack, onEvent);
+
+export type TrackClient = ReturnType<typeof connectTrack>;

@@ -3,22 +3,24 @@ import { toFailure } from '../../engine/channel';
 import { prefersReducedMotion } from '../../kit/dom';
 import { History } from '../../kit/history';
 import type { LabState } from '../../kit/state';
-import type { OpenInLab } from '../../lab/lab';
+import type { Lab, LabPlace } from '../../lab/lab';
+import { Opening } from '../../lab/opening';
+import { type RunningLab, Runs } from '../../lab/runs';
 import { contentOf } from '../../lab/session/content';
 import type { Moments } from '../../lab/session/moments';
 import type { ContentOf } from '../../lab/session/schema';
-import { RunLab } from '../../lab/shell';
+import { LabShell } from '../../lab/shell';
 import { LabStates } from '../../lab/states';
 import { unitOf } from '../../lab/surface-space';
 import { invert, sliceOrientations } from '../../scene/anatomy';
 import { text } from '../../texts';
 import { pointToShow, TrackAsking } from './asking';
 import { boxOf, type VoxelBox, voxelsOf } from './box';
-import { TrackClient } from './client';
+import { connectTrack } from './client';
 import { compareWith } from './comparison';
+import { type OpenedTrack, TrackData, type TrackOpening, type TrackSource } from './data';
 import type { TrackExample } from './examples';
 import { isChosen, linkOf, toHash } from './link';
-import { type OpenedTrack, TrackOpening, type TrackSource } from './opening';
 import { type PartEvents, TrackParts } from './parts';
 import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, viewOf } from './presets';
 import type { Alternative, StepEvent, Vec3, VolumeView, WorkerEvent } from './protocol';
@@ -30,12 +32,15 @@ import { type TrackMoment, TrackSettings } from './settings';
  * The Track lab: a surface is tracked through the frames of a 4D image. Opening, settings, results and comparison are in
  * files of their own.
  */
-export class TrackLab extends RunLab<TrackExample> {
-  protected readonly id = 'track';
-  protected readonly client = new TrackClient((event) => this.#onEvent(event));
-  protected readonly ui: TrackParts;
-  protected readonly states: LabStates;
-  protected readonly opening: TrackOpening;
+class TrackLab implements RunningLab<TrackExample> {
+  readonly shell: LabShell<TrackExample>;
+  readonly #runs: Runs<TrackExample>;
+
+  readonly id = 'track';
+  readonly client = connectTrack((event) => this.#onEvent(event));
+  readonly ui: TrackParts;
+  readonly states: LabStates;
+  readonly opening: TrackOpening;
   readonly #results: TrackResults;
   readonly #settings: TrackSettings;
   readonly #asking: TrackAsking;
@@ -56,13 +61,16 @@ export class TrackLab extends RunLab<TrackExample> {
    */
   #duration: number | undefined;
 
-  constructor(root: HTMLElement, help: HTMLElement, passOn: OpenInLab) {
-    super(root, help, passOn);
+  constructor(place: LabPlace) {
+    const shell = new LabShell(place, this);
+    const runs = new Runs(shell, this);
+    this.shell = shell;
+    this.#runs = runs;
     const { client } = this;
-    const { signal } = this.closing;
+    const { root, signal } = shell;
     const history = new History();
     const ui = new TrackParts(root, history, client, signal, this.#events());
-    const states = new LabStates(ui.banner, ui.status, signal);
+    const states = new LabStates(ui.page.banner, ui.page.status, signal);
     this.ui = ui;
     this.states = states;
     this.#results = new TrackResults(client, ui, states, history);
@@ -80,12 +88,13 @@ export class TrackLab extends RunLab<TrackExample> {
       onStuck: () => void this.opening.cancel(),
       describe: () => this.describe(),
     });
-    this.opening = new TrackOpening(
-      ...([client, ui, states] as const),
+    const data = new TrackData(
+      client,
       () => this.#settings.setup,
       (opened, source, reopening) => this.#adopt(opened, source, reopening),
     );
-    this.beginRuns(
+    this.opening = new Opening(client, ui.page, states, data);
+    runs.begin(
       [
         { key: 'b', shown: 'b', text: text('track.framesKey'), act: () => ui.frames.toggle() },
         { key: ',', shown: ',', text: text('track.previousFrameKey'), act: () => ui.frames.go(-1) },
@@ -98,7 +107,7 @@ export class TrackLab extends RunLab<TrackExample> {
   /** Returns the handlers of the user's actions, which call the parts of the lab. */
   #events(): PartEvents {
     return {
-      ...this.runEvents(),
+      ...this.#runs.events(),
       onCancel: () => this.#cancel(),
       onAsk: () => void this.#toggleAsking(),
       onHere: () => this.#asking.isOpen && this.#asking.here(),
@@ -110,13 +119,13 @@ export class TrackLab extends RunLab<TrackExample> {
       onPreparation: (preparation, what) => void this.#settings.change({ preparation }, what),
       onRegion: (region) => this.#setRegion(region),
       onComponent: (which) => this.#setComponent(which),
-      onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.ui.labelOf(name)),
+      onParam: (name, value) => void this.#settings.setParams({ [name]: value }, this.ui.page.labelOf(name)),
       onOptions: () => this.#optionsChanged(),
       onFrame: (frame) => this.#results.choose(frame),
-      onMoved: () => this.#results?.showFigures(),
+      onMoved: () => this.#results.showFigures(),
       onCompare: (other) => void this.#compare(other),
-      onCancelCompare: () => this.ask(this.client.request('cancelCompare', undefined)),
-      onSave: (what) => this.ask(this.#save(what), text('track.fileFailed')),
+      onCancelCompare: () => this.shell.ask(this.client.request('cancelCompare', undefined)),
+      onSave: (what) => this.shell.ask(this.#save(what), text('track.fileFailed')),
       onSculpt: () => this.#frameToSculpt(),
     };
   }
@@ -156,12 +165,12 @@ export class TrackLab extends RunLab<TrackExample> {
   async #toggleAsking(): Promise<void> {
     if (this.#asking.isOpen) {
       this.#asking.end();
-      this.ui.status.say(this.describe());
+      this.ui.page.status.say(this.describe());
       return;
     }
     await this.client.request('pause', undefined);
     this.#asking.begin();
-    this.ui.status.say(this.describe());
+    this.ui.page.status.say(this.describe());
   }
 
   /** Cancels what the worker is busy with. If that is the present image, it is opened again, and not run by itself. */
@@ -202,8 +211,8 @@ export class TrackLab extends RunLab<TrackExample> {
     if (view.frame !== undefined) this.#results.choose(view.frame);
   }
 
-  protected override async sessionContent(): Promise<Record<string, unknown> | undefined> {
-    const moments = await this.paused(() => this.#settings.moments());
+  async sessionContent(): Promise<Record<string, unknown> | undefined> {
+    const moments = await this.#runs.paused(() => this.#settings.moments());
     if (!moments) return undefined;
     const view = { ...this.ui.view.pose, options: this.ui.options.value, frame: this.#results.frame };
     return { ...(await import('./session')).packTrack(moments), view };
@@ -211,21 +220,21 @@ export class TrackLab extends RunLab<TrackExample> {
 
   async #save(what: Parameters<typeof saveTrack>[0]): Promise<void> {
     await saveTrack(what, this.client, this.ui, this.#results);
-    if (what !== 'table') this.work.settled('run');
+    if (what !== 'table') this.shell.work.settled('run');
   }
 
   /** The surface of one frame is not the run. */
-  protected override surfaceSaved(): void {
-    this.work.settled('edited');
+  surfaceSaved(): void {
+    this.shell.work.settled('edited');
   }
 
-  protected override codeRequest(): { frame: number } {
+  codeRequest(): { frame: number } {
     return { frame: this.#results.frame };
   }
 
   #takeVolume(volume: VolumeView, keep: boolean): void {
     this.#volume = volume;
-    this.ui.warnings.showData(volume.warnings);
+    this.ui.page.warnings.showData(volume.warnings);
     this.#results.setImage(volume, this.#slices, this.#truth, keep);
   }
 
@@ -282,49 +291,49 @@ export class TrackLab extends RunLab<TrackExample> {
     const given = { ...preset?.params };
     const variant = preset && variantInForce(preset, params, given);
     this.ui.showFigure(preset, variant);
-    this.updateAddress();
+    this.shell.updateAddress();
   }
 
   #optionsChanged(): void {
-    if (!this.states?.ready) return;
+    if (!this.states.ready) return;
     this.#results.showFigures();
-    this.updateAddress();
+    this.shell.updateAddress();
   }
 
-  protected override get canPlay(): boolean {
-    return super.canPlay && !this.#asking.isOpen;
+  get canPlay(): boolean {
+    return this.states.canRun && !this.#asking.isOpen;
   }
 
-  protected override get canStep(): boolean {
+  get canStep(): boolean {
     return this.canPlay;
   }
 
-  protected override beforeRun(change: string, isStep: boolean): void {
+  beforeRun(change: string, isStep: boolean): void {
     this.#results.follow();
     if (isStep) this.#settings.checkpoint(change);
   }
 
   /** Rebuilds the tracker with the same settings, and clears the results. */
-  protected startOver(): Promise<void> {
-    return this.building(() => this.#settings.rebuild());
+  startOver(): Promise<void> {
+    return this.#runs.building(() => this.#settings.rebuild());
   }
 
-  protected async travel(way: 'undo' | 'redo'): Promise<void> {
+  async travel(way: 'undo' | 'redo'): Promise<void> {
     this.#asking.end();
     await this.#settings.travel(way);
     if (this.#isUntouched) this.#ask();
   }
 
-  protected address({ example, name: file }: TrackSource): string {
+  address({ example, name: file }: TrackSource): string {
     const { setup } = this.#settings;
     return toHash(linkOf({ example, file, setup, view: this.ui.options.value, asks: this.#asking.isOpen }));
   }
 
   #frameToSculpt(): void {
     const { frame } = this.#results;
-    this.toSculpt(
-      this.ui.surfaceFile({ format: 'ply' }),
-      text('track.frameName', { name: this.ui.saving.name, frame: frame + 1 }),
+    this.#runs.toSculpt(
+      this.ui.run.surfaceFile({ format: 'ply' }),
+      text('track.frameName', { name: this.ui.page.saving.name, frame: frame + 1 }),
     );
   }
 
@@ -345,15 +354,15 @@ export class TrackLab extends RunLab<TrackExample> {
     }
   }
 
-  protected override closed(): void {
+  closed(): void {
     this.#results.close();
   }
 
   #onEvent(event: WorkerEvent): void {
     // A new state is displayed after the frames before it.
     if (event.event === 'state') this.#results.showPending();
-    if (this.takes(event)) return;
-    if (event.event === 'preparing') this.ui.status.say(event.what);
+    if (this.#runs.takes(event)) return;
+    if (event.event === 'preparing') this.ui.page.status.say(event.what);
     else if (event.event === 'comparing') this.ui.compare.showProgress(event.part, event.phase);
     else {
       this.#results.take(event);
@@ -365,14 +374,16 @@ export class TrackLab extends RunLab<TrackExample> {
   #report({ index }: StepEvent): void {
     if (index === undefined || this.states.value !== 'running') return;
     const { frames } = this.#results;
-    if (index === 0) this.ui.status.say(this.#results.describe('running'));
+    if (index === 0) this.ui.page.status.say(this.#results.describe('running'));
     else
-      this.ui.status.report(() => text('track.tracked', { tracked: frames.length, frames: this.#volume?.frames ?? 0 }));
+      this.ui.page.status.report(() =>
+        text('track.tracked', { tracked: frames.length, frames: this.#volume?.frames ?? 0 }),
+      );
   }
 
-  protected settled(state: 'running' | 'paused' | 'done'): void {
+  settled(state: 'running' | 'paused' | 'done'): void {
     this.#time(state);
-    this.ui.status.say(this.#results.describe(state));
+    this.ui.page.status.say(this.#results.describe(state));
     if (state === 'done' && !prefersReducedMotion()) this.ui.frames.start();
     else this.ui.frames.stop();
   }
@@ -388,13 +399,16 @@ export class TrackLab extends RunLab<TrackExample> {
     if (state === 'paused') this.#duration = undefined;
   }
 
-  protected showControls(state: LabState): void {
+  showControls(state: LabState): void {
     const { frames, frame } = this.#results;
     this.ui.showState(state, this.states.modelState, this.states.ready, frames.length, frames[frame] !== undefined);
   }
 
-  protected describe(): string {
+  describe(): string {
     if (this.#asking.isOpen && this.states.modelState !== 'running') return text('track.asks');
     return this.#results.describe(this.states.value);
   }
 }
+
+/** Makes the Track lab. */
+export const openTrack = (place: LabPlace): Lab => new TrackLab(place).shell;

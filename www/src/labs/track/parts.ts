@@ -1,4 +1,4 @@
-import { concerning, type Warning } from '../../engine/warnings';
+import { concerning } from '../../engine/warnings';
 import { fileChooser } from '../../importers/files';
 import { folded, h, section, wideButton } from '../../kit/dom';
 import { FigurePanel } from '../../kit/figure';
@@ -6,7 +6,8 @@ import type { History } from '../../kit/history';
 import { MeasurePanel } from '../../kit/measures';
 import type { LabState } from '../../kit/state';
 import { OptionControls } from '../../kit/view-options';
-import { type RunEvents, RunParts } from '../../lab/parts';
+import { LabPage } from '../../lab/page';
+import { RunControls, type RunEvents } from '../../lab/run-controls';
 import { spaceOf, unitOf } from '../../lab/surface-space';
 import { text } from '../../texts';
 import type { VoxelBox } from './box';
@@ -50,9 +51,12 @@ export interface PartEvents extends RunEvents<TrackExample>, RegionEvents, Objec
 }
 
 /** Controls and views of the Track lab. */
-export class TrackParts extends RunParts<TrackExample> {
+export class TrackParts {
+  readonly page: LabPage<TrackExample>;
+  readonly run: RunControls;
+
   readonly #slices = h('div', { class: 'slices' });
-  readonly view = new TrackView(this.canvas, this.#slices, INITIAL_VIEW);
+  readonly view: TrackView;
   readonly measures = new MeasurePanel(TRACK_ROWS);
   readonly table = new FrameTable();
   readonly options: OptionControls<TrackViewOptions>;
@@ -76,15 +80,21 @@ export class TrackParts extends RunParts<TrackExample> {
   #window = 2;
 
   constructor(root: HTMLElement, history: History, client: TrackClient, signal: AbortSignal, events: PartEvents) {
-    super(root, signal, events, {
+    this.page = new LabPage(root, signal, events, {
       viewLabel: text('track.viewLabel'),
       drop: text('track.drop'),
       admission: 'frames',
       data: imageData(fileChooser(events.onFiles, undefined, undefined, 'frames'), events.onExample),
       ownControls: ['threshold'],
+      onParams: (specs) => this.#makeThreshold(specs),
+    });
+    this.run = new RunControls(this.page, events, {
       history,
       fetchMesh: (request) => client.request('export', { ...request, frame: this.frames.frame }),
+      suffix: () => `-${this.frames.frame + 1}`,
+      concerningSurface: (warnings) => concerning(warnings, { frame: this.frames.frame }),
     });
+    this.view = new TrackView(this.page.canvas, this.#slices, INITIAL_VIEW);
     this.#onParam = events.onParam;
     this.#figure = new FigurePanel<TrackVariant, TrackPreset>(events.onVariant);
     this.preparation = new PreparationControls(events.onPreparation);
@@ -116,35 +126,34 @@ export class TrackParts extends RunParts<TrackExample> {
     });
     this.view.onRegion = (region: VoxelBox) => events.onRegion(region);
     this.view.onMoved = events.onMoved;
-    this.warnings.actions = { frame: stopAt, point: (point) => this.view.goTo(point) };
-    this.layOut({
+    this.page.warnings.actions = { frame: stopAt, point: (point) => this.view.goTo(point) };
+    this.page.layOut({
       name: 'track',
       options: this.options.element,
       over: [this.view.editing.legend.element],
       stage: (view, status) => [
-        ...[view, this.frames.element, this.transport.element, status],
+        ...[view, this.frames.element, this.run.transport.element, status],
         ...[this.object.element, this.#slices, this.stills.element],
       ],
       setup: [
-        section(text('track.sectionImage'), this.data.element, this.#figure.element),
+        section(text('track.sectionImage'), this.page.data.element, this.#figure.element),
         section(text('track.sectionBoundary'), this.#thresholdHolder),
         section(text('track.sectionRegion'), this.region.element),
         folded(text('track.sectionPreparation'), this.preparation.element),
-        this.paramsSection(),
+        this.page.paramsSection(),
       ],
       results: [
         section(text('track.sectionCurve'), this.curve.element, this.table.warnings),
-        section(text('track.sectionSurface'), this.warnings.element, this.measures.element),
-        this.saveSection(this.view.subject, ...this.#saves, this.#sculpt),
-        ...this.finishSections(this.view.editing, this.measures, () => this.frames.stop()),
+        section(text('track.sectionSurface'), this.page.warnings.element, this.measures.element),
+        this.run.saveSection(this.view.subject, ...this.#saves, this.#sculpt),
+        ...this.run.finishSections(this.view.editing, this.measures, () => this.frames.stop()),
         folded(text('labs.frames'), this.table.element),
         folded(text('track.sectionCompare'), this.compare.element),
       ],
     });
   }
 
-  override makeParams(specs: ParamSpec[]): void {
-    super.makeParams(specs);
+  #makeThreshold(specs: ParamSpec[]): void {
     const threshold = specs.find(({ name }) => name === 'threshold');
     if (!threshold || this.#threshold) return;
     this.#threshold = new EdgeThreshold(
@@ -155,27 +164,19 @@ export class TrackParts extends RunParts<TrackExample> {
     this.#thresholdHolder.replaceWith(this.#threshold.element);
   }
 
-  override get surfaceWarnings(): readonly Warning[] {
-    return concerning(super.surfaceWarnings, { frame: this.frames.frame });
-  }
-
-  protected override get suffix(): string {
-    return `-${this.frames.frame + 1}`;
-  }
-
   /** Shows the facts about a newly opened image. */
   adopt(opened: OpenedImage, example: TrackExample | undefined, name: string): void {
     const unit = example?.unit ?? unitOf(opened.volume);
-    this.saving.name = example?.id ?? name;
+    this.page.saving.name = example?.id ?? name;
     this.measures.unit = unit;
-    this.unit = unit;
-    this.surfaceSpace = spaceOf(opened.volume, unit);
-    this.data.show(factsOf(opened, name, unit), example);
+    this.run.unit = unit;
+    this.run.surfaceSpace = spaceOf(opened.volume, unit);
+    this.page.data.show(factsOf(opened, name, unit), example);
   }
 
   showParams(params: ParamValues, noise: number, suggested: number, most: number): void {
     this.#window = Number(params.window);
-    this.displayParams(params);
+    this.page.showParams(params);
     this.#threshold?.show(Number(params.threshold), noise, suggested, most);
   }
 
@@ -183,9 +184,9 @@ export class TrackParts extends RunParts<TrackExample> {
     this.#figure.show(preset, variant);
   }
 
-  override refuseParam(name: string, message: string): void {
+  refuseParam(name: string, message: string): void {
     if (name === 'threshold') this.#threshold?.showError(message);
-    else super.refuseParam(name, message);
+    else this.page.refuseParam(name, message);
   }
 
   /**
@@ -193,19 +194,19 @@ export class TrackParts extends RunParts<TrackExample> {
    * whether the displayed frame has one.
    */
   showState(state: LabState, beneath: LabState, ready: boolean, tracked: number, here: boolean): void {
-    const idle = this.showRunState(state, beneath, ready, here);
-    this.exports.enabled = idle && here;
+    const idle = this.run.showState(state, beneath, ready, here);
+    this.run.exports.enabled = idle && here;
     this.#sculpt.disabled = !idle || !here;
     // While the lab asks for the object, there is nothing to run.
-    if (this.object.open) this.transport.showState(beneath, false);
+    if (this.object.open) this.run.transport.showState(beneath, false);
     this.object.enabled = idle;
     this.region.enabled = idle;
     for (const save of this.#saves) save.disabled = !idle || tracked === 0;
     this.compare.enabled = idle && beneath === 'done';
   }
 
-  override dispose(): void {
-    super.dispose();
+  dispose(): void {
+    this.run.dispose();
     this.frames.stop();
     this.view.dispose();
   }

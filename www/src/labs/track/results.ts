@@ -171,7 +171,7 @@ export class TrackResults {
     const count = this.#image?.volume.frames ?? 1;
     const shown = Math.min(frame, count - 1);
     // The edits are of the frame that was displayed.
-    if (shown !== this.#frame) this.#ui.finish?.reset();
+    if (shown !== this.#frame) this.#ui.run.finish?.reset();
     this.#frame = shown;
     const tracked = this.#frames[this.#frame];
     view.showFrame(this.#frame, tracked?.surface);
@@ -183,8 +183,8 @@ export class TrackResults {
     this.showCurve();
     this.showFigures();
     const last = this.#history.reports.at(-1);
-    this.#ui.transport.showReport(last);
-    this.#ui.warnings.showReport(last);
+    this.#ui.run.transport.showReport(last);
+    this.#ui.page.warnings.showReport(last);
     const { value, modelState, ready } = this.#states;
     this.#ui.showState(value, modelState, ready, this.#frames.length, tracked !== undefined);
     this.#root.dataset.frame = String(this.#frame + 1);

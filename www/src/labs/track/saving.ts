@@ -1,19 +1,10 @@
 import { zipSync } from 'three/addons/libs/fflate.module.js';
-import type { Unit } from '../../engine/protocol';
 import { concerning, type Warning } from '../../engine/warnings';
-import type { Saving } from '../../lab/saving';
 import type { SurfaceSpace } from '../../lab/surface-space';
 import type { TrackClient } from './client';
 import { framesCsv } from './measures';
+import type { TrackParts } from './parts';
 import type { TrackResults } from './results';
-
-/** A lab's page, as saving needs it. */
-interface Saver {
-  saving: Saving;
-  surfaceSpace: SurfaceSpace;
-  unit: Unit;
-  warnings: { all: readonly Warning[] };
-}
 
 /**
  * Saves all tracked frames: their surfaces as PLY files in one ZIP archive, as one animation, or their measures as a
@@ -22,9 +13,11 @@ interface Saver {
 export async function saveTrack(
   what: 'frames' | 'animation' | 'table',
   client: TrackClient,
-  { saving, surfaceSpace, unit, warnings: { all } }: Saver,
+  { page, run: { surfaceSpace } }: Pick<TrackParts, 'page' | 'run'>,
   { frames, truth }: TrackResults,
 ): Promise<void> {
+  const { saving, unit, warnings } = page;
+  const { all } = warnings;
   if (what === 'table') saving.bytes('csv', new TextEncoder().encode(framesCsv(frames, truth, all, unit)), 'text/csv');
   else if (what === 'animation')
     saving.bytes('glb', await client.request('animation', surfaceSpace), 'model/gltf-binary');

@@ -59,7 +59,7 @@ export class TrackSettings {
     this.#undo = new UndoHistory<PageState, SavedTrack>(
       client,
       () => ({ record: results.record() }),
-      (undoable, redoable) => ui.transport.showUndo(undoable, redoable),
+      (undoable, redoable) => ui.run.transport.showUndo(undoable, redoable),
     );
   }
 
@@ -151,7 +151,7 @@ export class TrackSettings {
         this.#setup = { ...this.#setup, params: { ...this.#setup.params, ...values } };
         this.#ready = { ...this.#ready, params };
         this.#inForce();
-        this.#ui.banner.hide();
+        this.#ui.page.banner.hide();
         this.#results.rewind(iteration);
         this.#states.idle(text(this.runs ? 'track.trackingAgain' : 'labs.ready'));
         this.#onChange();

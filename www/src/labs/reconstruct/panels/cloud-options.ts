@@ -22,25 +22,26 @@ const OPTIONS: ViewOption<CloudViewOptions>[] = [
   { name: 'color', label: text('controls.color'), choices: CLOUD_COLORS },
 ];
 
-/** Controls for the view options of the Reconstruct lab: which objects are shown, and the surface's colouring. */
-export class CloudOptionControls extends OptionControls<CloudViewOptions> {
-  constructor(initial: CloudViewOptions, onChange: (options: CloudViewOptions) => void) {
-    const key = (name: string, label: string) =>
-      h('span', {}, h('span', { class: `dot ${name}`, 'aria-hidden': 'true' }), label);
-    const [surface, exterior] = [text('pointPanels.legendSurface'), text('pointPanels.legendExterior')];
-    const legend = h('p', { class: 'legend' }, key('point', surface), key('exterior', exterior));
-    super(OPTIONS, initial, (options) => {
-      legend.hidden = !options.constraints;
-      onChange(options);
-    });
-    legend.hidden = !initial.constraints;
-    this.elementOf('color')?.before(legend);
-  }
+/** Makes controls for the view options of the Reconstruct lab: which objects are shown, and the surface's colouring. */
+export function cloudOptions(
+  initial: CloudViewOptions,
+  onChange: (options: CloudViewOptions) => void,
+): OptionControls<CloudViewOptions> {
+  const key = (name: string, label: string) =>
+    h('span', {}, h('span', { class: `dot ${name}`, 'aria-hidden': 'true' }), label);
+  const [surface, exterior] = [text('pointPanels.legendSurface'), text('pointPanels.legendExterior')];
+  const legend = h('p', { class: 'legend' }, key('point', surface), key('exterior', exterior));
+  const controls = new OptionControls(OPTIONS, initial, (options) => {
+    legend.hidden = !options.constraints;
+    onChange(options);
+  });
+  legend.hidden = !initial.constraints;
+  controls.place(legend, 'color');
+  return controls;
+}
 
-  /** Whether there are cameras to show; if not, the checkbox that shows them is hidden and cleared. */
-  set hasCameras(has: boolean) {
-    const box = this.elementOf('cameras');
-    if (box) box.hidden = !has;
-    if (!has && this.value.cameras) this.set({ cameras: false });
-  }
+/** Offers to show cameras if there are any; if not, the checkbox that shows them is hidden and cleared. */
+export function offerCameras(controls: OptionControls<CloudViewOptions>, areThere: boolean): void {
+  controls.hide('cameras', !areThere);
+  if (!areThere && controls.value.cameras) controls.set({ cameras: false });
 }

@@ -1,5 +1,5 @@
 import type { Choice } from '../../../kit/field';
-import { OptionControls, type ViewOption } from '../../../kit/view-options';
+import type { OptionControls, ViewOption } from '../../../kit/view-options';
 import type { SurfaceColor } from '../../../scene/surface';
 import { text } from '../../../texts';
 import type { Layout } from '../protocol';
@@ -23,40 +23,28 @@ const SCULPT_COLORS: Choice<SurfaceColor>[] = [
   { value: 'mean curvature', label: text('controls.colorMeanCurvature') },
 ];
 
-const OPTIONS: ViewOption<SculptViewOptions>[] = [
+/** View options of the Sculpt lab: which meshes and ellipsoids are shown, and the surfaces' colouring. */
+export const SCULPT_OPTIONS: ViewOption<SculptViewOptions>[] = [
   { name: 'edges', label: text('controls.viewWireframe') },
   { name: 'ellipsoids', label: text('sculptPanels.ellipsoids') },
   { name: 'layout', label: text('sculptPanels.show'), choices: LAYOUTS },
   { name: 'color', label: text('controls.color'), choices: SCULPT_COLORS },
 ];
 
-/**
- * Controls for the view options of the Sculpt lab: which meshes and ellipsoids are shown, and the surfaces' colouring.
- */
-export class SculptOptionControls extends OptionControls<SculptViewOptions> {
-  constructor(initial: SculptViewOptions, onChange: (options: SculptViewOptions) => void) {
-    super(OPTIONS, initial, onChange);
-  }
+type Controls = OptionControls<SculptViewOptions>;
 
-  /** Whether there are stages of restructuring to show; if not, that layout is not offered. */
-  set staged(staged: boolean) {
-    const entry = this.entryOf('layout', 'stages');
-    if (entry) entry.hidden = !staged;
-  }
+/** Offers the layout of stages of restructuring if there are any. */
+export const offerStages = (controls: Controls, areThere: boolean): void =>
+  controls.hideEntry('layout', 'stages', !areThere);
 
-  /** Whether the surface is a detail on a membrane; else there is nothing besides the result to show. */
-  set membrane(membrane: boolean) {
-    for (const layout of ['base', 'pair', 'row', 'levels']) {
-      const entry = this.entryOf('layout', layout);
-      if (entry) entry.hidden = !membrane;
-    }
-    if (!membrane && this.value.layout !== 'result') this.set({ layout: 'result' });
-  }
+/** Offers the layouts of a detail on a membrane; if the surface is none, there is nothing besides the result to show. */
+export function offerLayouts(controls: Controls, isMembrane: boolean): void {
+  for (const layout of ['base', 'pair', 'row', 'levels']) controls.hideEntry('layout', layout, !isMembrane);
+  if (!isMembrane && controls.value.layout !== 'result') controls.set({ layout: 'result' });
+}
 
-  /** Whether the surface has a texture to show; if not, it is not offered, and a textured surface becomes plain. */
-  set textured(textured: boolean) {
-    const entry = this.entryOf('color', 'texture');
-    if (entry) entry.disabled = !textured;
-    if (!textured && this.value.color === 'texture') this.set({ color: 'plain' });
-  }
+/** Offers the surface's texture if it has one; if not, a textured surface becomes plain. */
+export function offerTexture(controls: Controls, isThere: boolean): void {
+  controls.disableEntry('color', 'texture', !isThere);
+  if (!isThere && controls.value.color === 'texture') controls.set({ color: 'plain' });
 }

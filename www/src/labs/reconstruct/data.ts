@@ -1,14 +1,12 @@
-import { Opening, type Source } from '../../lab/opening';
+import type { LabData, Loading, Opening, Source } from '../../lab/opening';
 import { contentOf } from '../../lab/session/content';
 import type { ContentOf } from '../../lab/session/schema';
-import type { LabStates } from '../../lab/states';
 import { text } from '../../texts';
 import { completed } from './before';
 import type { ReconstructClient } from './client';
 import { CLOUDS, type CloudExample } from './examples';
 import { fromHash, type LinkedCloud, withLink } from './link';
 import type { CloudChoice } from './panels/cloud-setup';
-import type { ReconstructParts } from './parts';
 import type { Photograph } from './photographs';
 import { NO_EDITS } from './picking';
 import { type PointFiles as Data, fromExample, fromFiles } from './point-files';
@@ -17,6 +15,7 @@ import type { Cloud, CloudSource, NamedBytes, ParamSpec, ParamValues, SavedSurfa
 import type { ReconstructSettings } from './settings';
 
 export type CloudOrigin = Source<CloudExample, LinkedCloud, Data>;
+export type ReconstructOpening = Opening<CloudExample, LinkedCloud, Data, OpenedCloud>;
 
 /** Points opened in the Reconstruct lab, and the settings of their model, which the worker has built. */
 export interface OpenedCloud {
@@ -28,54 +27,56 @@ export interface OpenedCloud {
   from: CloudSource;
 }
 
-/** Opens points in the Reconstruct lab, with or without cameras and photographs. */
-export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data, OpenedCloud> {
-  protected readonly first = CLOUDS[0];
+/** Points of the Reconstruct lab, with or without cameras and photographs, and how they are opened. */
+export class ReconstructData implements LabData<CloudExample, LinkedCloud, Data, OpenedCloud> {
+  readonly first = CLOUDS[0];
   readonly #client: ReconstructClient;
   readonly #settings: ReconstructSettings;
-  readonly #onOpened: (opened: OpenedCloud, origin: CloudOrigin) => Promise<void>;
+  readonly adopt: (opened: OpenedCloud, origin: CloudOrigin) => Promise<void>;
   /** Default parameters of the method; links contain only the parameters that differ. */
   defaults: ParamValues = {};
 
+  /** `adopt` displays what was opened. */
   constructor(
     client: ReconstructClient,
-    ui: ReconstructParts,
-    states: LabStates,
     settings: ReconstructSettings,
-    onOpened: (opened: OpenedCloud, origin: CloudOrigin) => Promise<void>,
+    adopt: (opened: OpenedCloud, origin: CloudOrigin) => Promise<void>,
   ) {
-    super(client, ui, states);
     this.#client = client;
     this.#settings = settings;
-    this.#onOpened = onOpened;
+    this.adopt = adopt;
   }
 
-  protected override onEngineReady(specs: ParamSpec[]): void {
+  onEngineReady(specs: ParamSpec[]): void {
     this.defaults = Object.fromEntries(specs.map(({ name, default: value }) => [name, value]));
   }
 
-  protected find(id: string): CloudExample | undefined {
+  find(id: string): CloudExample | undefined {
     return cloudById(id);
   }
 
-  protected linkedBy(hash: string): LinkedCloud | undefined {
+  linkedBy(hash: string): LinkedCloud | undefined {
     return fromHash(hash);
   }
 
-  protected fromExample(example: CloudExample): CloudOrigin {
+  fromExample(example: CloudExample): CloudOrigin {
     const name = 'file' in example.source ? example.source.file : example.source.shape;
     return { name, load: () => fromExample(example), example };
   }
 
-  protected fromFiles(files: File[]): CloudOrigin {
+  fromFiles(files: File[]): CloudOrigin {
     const points = files.find((file) => !/\.(json|png|jpe?g|webp)$/i.test(file.name))?.name;
     return { name: points ?? files.map((file) => file.name).join(' + '), load: () => fromFiles(files) };
   }
 
-  protected async load(origin: CloudOrigin, { source, photographs }: Data): Promise<OpenedCloud> {
-    const from = source ?? (await this.#presentPoints());
+  async load(
+    origin: CloudOrigin,
+    { source, photographs }: Data,
+    { present }: Loading<CloudExample, LinkedCloud, Data>,
+  ): Promise<OpenedCloud> {
+    const from = source ?? (await pointsOf(present));
     const saved = origin.session && savedIn(completed(contentOf(origin.session, 'reconstruct')));
-    const setup = saved?.setup ?? this.#setupFor(origin, source === undefined);
+    const setup = saved?.setup ?? this.#setupFor(origin, source === undefined, present);
     const cameras = photographs.map(({ view }) => view);
     const loaded = await this.#client.request('load', { source: from, cameras, setup, saved });
     return { ...loaded, photographs, setup, from };
@@ -85,36 +86,23 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
    * Returns the source to open again after a failure of the engine: the opened one or, if only cameras were opened, the
    * present points with these cameras.
    */
-  protected override sourceToRemember(
+  sourceToRemember(
     origin: CloudOrigin,
     { from, photographs }: OpenedCloud,
     { source }: Data,
+    present: CloudOrigin | undefined,
   ): CloudOrigin {
     if (source) return origin;
-    return { ...origin, name: this.source?.name ?? origin.name, load: async () => ({ source: from, photographs }) };
+    return { ...origin, name: present?.name ?? origin.name, load: async () => ({ source: from, photographs }) };
   }
 
-  override filesOf({ source, files = [] }: Data): NamedBytes[] {
+  filesOf({ source, files = [] }: Data): NamedBytes[] {
     return source && 'file' in source && files.length === 0 ? [source.file] : files;
   }
 
-  protected adopt(opened: OpenedCloud, origin: CloudOrigin): Promise<void> {
-    return this.#onOpened(opened, origin);
-  }
-
-  /**
-   * Returns the source of the points that are open, for cameras that are opened after them. Throws if there are none.
-   */
-  async #presentPoints(): Promise<CloudSource> {
-    if (!this.source) throw new Error(text('reconstruct.camerasNeedPoints'));
-    const { source } = await this.source.load();
-    if (!source) throw new Error(text('reconstruct.camerasWithPoints'));
-    return source;
-  }
-
-  #setupFor(origin: CloudOrigin, samePoints: boolean): Setup {
+  #setupFor(origin: CloudOrigin, samePoints: boolean, present: CloudOrigin | undefined): Setup {
     const { linked } = origin;
-    const { params, ...choice } = this.#usual(origin, samePoints);
+    const { params, ...choice } = this.#usual(origin, samePoints, present);
     return {
       params: { ...params, ...linked?.params },
       ...withLink(choice, linked ?? {}),
@@ -127,7 +115,11 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
    * in force; for points from a file opened without a link, when those before were from a file, too, the settings in
    * force but the cell size; else the defaults.
    */
-  #usual({ example, linked }: CloudOrigin, samePoints: boolean): CloudChoice & { params: ParamValues } {
+  #usual(
+    { example, linked }: CloudOrigin,
+    samePoints: boolean,
+    present: CloudOrigin | undefined,
+  ): CloudChoice & { params: ParamValues } {
     if (example) {
       const first = firstVariant(example);
       const params = { ...this.defaults, ...example.params, ...(linked ? {} : first?.params) };
@@ -135,12 +127,22 @@ export class ReconstructOpening extends Opening<CloudExample, LinkedCloud, Data,
     }
     const { params, choice } = this.#settings;
     if (samePoints) return { params, ...choice };
-    if (linked || !this.source || this.source.example)
+    if (linked || !present || present.example)
       return { params: this.defaults, maxPoints: undefined, keepComponents: undefined };
     // The cell size is a length in the units of other points.
     const { cell: _, ...others } = params;
     return { params: others, ...choice };
   }
+}
+
+/**
+ * Returns the points of a source, for cameras that are opened after them. Throws if there are none.
+ */
+async function pointsOf(present: CloudOrigin | undefined): Promise<CloudSource> {
+  if (!present) throw new Error(text('reconstruct.camerasNeedPoints'));
+  const { source } = await present.load();
+  if (!source) throw new Error(text('reconstruct.camerasWithPoints'));
+  return source;
 }
 
 const savedIn = ({ state, model }: ContentOf<'reconstruct'>): SavedSurface => ({ ...model, state });

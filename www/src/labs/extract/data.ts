@@ -6,37 +6,39 @@ import { count } from '../../kit/format';
 import { dataUrl, fetchBytes, preload } from '../../lab/downloads';
 import type { Handoff } from '../../lab/lab';
 import { LinkError, readLink } from '../../lab/link-query';
-import { Opening, type Source } from '../../lab/opening';
+import type { LabData, Loading, Opening, Source } from '../../lab/opening';
 import { contentOf } from '../../lab/session/content';
 import type { Session } from '../../lab/session/file';
 import type { ContentOf } from '../../lab/session/schema';
 import type { LabStates } from '../../lab/states';
 import { text } from '../../texts';
-import type { Client } from './client';
+import type { ExtractClient } from './client';
 import { EXAMPLES, type Example } from './examples';
 import { fromHash, type Linked, withLink } from './link';
 import { type StartChoice, USUAL_START } from './panels/start';
 import type { ExtractParts } from './parts';
 import { defaultStart, exampleById } from './presets';
-import type { ImageSource, LargeSource, Loaded, Setup } from './protocol';
+import type { ImageSource, Loaded, Setup } from './protocol';
 import type { ExtractResults } from './results';
 import type { ExtractMoments, ExtractSettings } from './settings';
 
 export type ExtractSource = Source<Example, Linked, ImageSource>;
+export type ExtractOpening = Opening<Example, Linked, ImageSource, OpenedVolume>;
 
 /** A volume opened in the Extract lab, and the settings of its model, which has done no step yet. */
-interface OpenedVolume extends Loaded {
+export interface OpenedVolume extends Loaded {
   choice: StartChoice;
   setup: Setup;
   /** The states of the session that is continued. */
   moments?: ExtractMoments | undefined;
 }
 
-/** Opens volumes in the Extract lab, and builds models of them. */
-export class ExtractOpening extends Opening<Example, Linked, ImageSource, OpenedVolume> {
-  protected readonly first = EXAMPLES[0];
-  readonly #client: Client;
+/** Volumes of the Extract lab, and how models of them are built. */
+export class ExtractData implements LabData<Example, Linked, ImageSource, OpenedVolume> {
+  readonly first = EXAMPLES[0];
+  readonly #client: ExtractClient;
   readonly #ui: ExtractParts;
+  readonly #states: LabStates;
   readonly #settings: ExtractSettings;
   readonly #results: ExtractResults;
   /** Sends the view's settings to the worker again, after a restart of the engine. */
@@ -48,48 +50,36 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
   defaults: ParamValues = {};
 
   constructor(
-    client: Client,
+    client: ExtractClient,
     ui: ExtractParts,
     states: LabStates,
     settings: ExtractSettings,
     results: ExtractResults,
     onRestart: () => Promise<unknown>,
   ) {
-    super(client, ui, states);
     this.#client = client;
     this.#ui = ui;
+    this.#states = states;
     this.#settings = settings;
     this.#results = results;
     this.#onRestart = onRestart;
   }
 
-  /**
-   * Starts to download the volume of the example that the address names, or of the first example if it names none,
-   * while the engine loads.
-   */
-  static fetchLinked(): void {
-    const linked = readLink(() => fromHash(location.hash));
-    // Opening says what is wrong.
-    if (linked instanceof LinkError) return;
-    const example = linked?.example ? exampleById(linked.example) : EXAMPLES[0];
-    if (example && !linked?.file && 'file' in example.source) preload(dataUrl(example.source.file));
-  }
-
-  /** Opens a volume passed on by another lab, with the parameters passed on with it. */
-  override passedOn({ name, bytes, params, warnings = [] }: Handoff): Promise<void> {
+  /** Returns a volume passed on by another lab, with the parameters passed on with it. */
+  fromHandoff({ name, bytes, params, warnings = [] }: Handoff): ExtractSource {
     const load = async () => ({ files: [{ name, bytes: bytes.slice() }] });
-    return this.open({ name, load, linked: { params, attractors: [] }, unit: '', isMade: true, warnings });
+    return { name, load, linked: { params, attractors: [] }, unit: '', isMade: true, warnings };
   }
 
-  protected find(id: string): Example | undefined {
+  find(id: string): Example | undefined {
     return exampleById(id);
   }
 
-  protected linkedBy(hash: string): Linked | undefined {
+  linkedBy(hash: string): Linked | undefined {
     return fromHash(hash);
   }
 
-  protected fromExample(example: Example): ExtractSource {
+  fromExample(example: Example): ExtractSource {
     const { source } = example;
     if ('shape' in source) return { name: source.shape, load: async () => source, example };
     const { file } = source;
@@ -97,32 +87,26 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     return { name: file, load, example };
   }
 
-  /** Opens an image larger than memory. */
-  large(name: string, source: LargeSource): Promise<void> {
-    return this.open({ name, load: async () => source });
-  }
-
-  /** Opens another frame of the open volume, with the settings in force. */
-  async frame(frame: number): Promise<void> {
-    if (!this.source) return;
-    const { session: _, ...source } = this.source;
+  /** Returns another frame of the open volume, with the settings in force. */
+  atFrame({ session: _, ...present }: ExtractSource, frame: number): ExtractSource {
     const { params, attractors, sphere } = this.#settings;
     const { kind: start, edge = 0, ...choice } = this.#ui.start.inForce;
-    await this.open({
-      ...source,
-      linked: { ...choice, frame, start, edge, sphere, params, attractors },
-      isChange: true,
-    });
+    const linked = { ...choice, frame, start, edge, sphere, params, attractors };
+    return { ...present, linked, isChange: true };
   }
 
-  protected fromFiles(files: File[]): ExtractSource {
+  fromFiles(files: File[]): ExtractSource {
     const [archive] = files;
     if (files.length === 1 && archive && /\.zip$/i.test(archive.name))
       return { name: archive.name, load: async () => ({ zarr: archive }) };
     return { name: nameOf(files), ...reading(files) };
   }
 
-  protected async load(source: ExtractSource, volume: ImageSource, reopening: boolean): Promise<OpenedVolume> {
+  async load(
+    source: ExtractSource,
+    volume: ImageSource,
+    { reopening }: Loading<Example, Linked, ImageSource>,
+  ): Promise<OpenedVolume> {
     const moments = source.session && !reopening ? await momentsOf(source.session) : undefined;
     const { saved, page } = moments?.now ?? {};
     const choice = page?.choice ?? (reopening ? this.#ui.start.inForce : this.#startFor(source, volume));
@@ -141,10 +125,10 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     return { ...loaded, choice: { ...choice, levels: loaded.levels }, setup, moments };
   }
 
-  protected async adopt(opened: OpenedVolume, source: ExtractSource, reopening: boolean): Promise<void> {
+  async adopt(opened: OpenedVolume, source: ExtractSource, reopening: boolean): Promise<void> {
     if (reopening) return this.#takeUp(opened, source);
     const { volume, choice, params, setup, moments, labels = 0 } = opened;
-    this.states.ready = true;
+    this.#states.ready = true;
     this.#ui.adopt(volume, source, labels);
     if (source.linked?.color) this.#ui.options.set({ color: source.linked.color });
     this.#settings.adopt(volume, choice, params, setup);
@@ -158,7 +142,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
    * newest saved state, or begins a new model if there is none.
    */
   async #takeUp({ choice, params }: OpenedVolume, { example }: ExtractSource): Promise<void> {
-    this.#ui.data.choose(example);
+    this.#ui.page.data.choose(example);
     // Sends the slice planes to the new engine.
     this.#ui.stage.goTo(this.#ui.stage.crosshair);
     const { newest } = this.#settings;
@@ -166,7 +150,7 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
       await this.#client.request('restore', newest.saved);
       this.#settings.adoptMoment(newest);
     } else this.#settings.begin(choice, params);
-    this.#ui.status.say(
+    this.#ui.page.status.say(
       newest ? text('extract.restartedFrom', { iteration: count(newest.saved.iteration) }) : text('extract.restarted'),
     );
   }
@@ -179,36 +163,36 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
     this.#ui.stage.view = view;
   }
 
-  protected override kept(): void {
-    if (this.source) this.#ui.showFrame(this.source);
+  kept(present: ExtractSource | undefined): void {
+    if (present) this.#ui.showFrame(present);
   }
 
-  protected override voxelsOf({ volume }: OpenedVolume): number {
+  voxelsOf({ volume }: OpenedVolume): number {
     return volume.voxels.length;
   }
 
-  override filesOf(source: ImageSource): NamedBytes[] {
+  filesOf(source: ImageSource): NamedBytes[] {
     return 'files' in source ? source.files : [];
   }
 
-  protected override superseded(): void {
+  superseded(): void {
     this.#client.request('cancelLoad', undefined).catch(() => undefined);
   }
 
-  protected override save(): void {
+  save(): void {
     this.#settings.save();
   }
 
-  protected override saved(): Promise<unknown> {
+  saved(): Promise<unknown> {
     return this.#settings.saved;
   }
 
-  protected override onEngineReady(specs: ParamSpec[]): void {
+  onEngineReady(specs: ParamSpec[]): void {
     const known = specs.filter(({ name }) => name !== 'iso');
     this.defaults = Object.fromEntries(known.map(({ name, default: value }) => [name, value]));
   }
 
-  protected override restarted(): Promise<unknown> {
+  restarted(): Promise<unknown> {
     this.#results.forgetBuffers();
     return this.#onRestart();
   }
@@ -244,6 +228,18 @@ export class ExtractOpening extends Opening<Example, Linked, ImageSource, Opened
       : own;
     return linked ? withLink(example ? suits : USUAL_START, linked) : suits;
   }
+}
+
+/**
+ * Starts to download the volume of the example that the address names, or of the first example if it names none,
+ * while the engine loads.
+ */
+export function fetchLinked(): void {
+  const linked = readLink(() => fromHash(location.hash));
+  // Opening says what is wrong.
+  if (linked instanceof LinkError) return;
+  const example = linked?.example ? exampleById(linked.example) : EXAMPLES[0];
+  if (example && !linked?.file && 'file' in example.source) preload(dataUrl(example.source.file));
 }
 
 async function momentsOf(session: Session): Promise<ExtractMoments> {

@@ -1,5 +1,5 @@
 import type { Handoff } from '../../lab/lab';
-import { Opening, type Source } from '../../lab/opening';
+import type { LabData, Opening, Source } from '../../lab/opening';
 import { contentOf } from '../../lab/session/content';
 import type { LabStates } from '../../lab/states';
 import { text } from '../../texts';
@@ -7,12 +7,12 @@ import type { SculptClient } from './client';
 import { SCENES, type SculptExample } from './examples';
 import { fromHash, type LinkedScene } from './link';
 import { fromExample, fromFiles } from './mesh-files';
-import type { SculptParts } from './parts';
 import { poseOf, sceneById } from './presets';
 import type { NamedBytes, OpenedScene, SceneSource, Support } from './protocol';
 import type { SculptMoments } from './settings';
 
 export type SculptSource = Source<SculptExample, LinkedScene, SceneSource>;
+export type SculptOpening = Opening<SculptExample, LinkedScene, SceneSource, OpenedPose>;
 
 /** A scene opened in the Sculpt lab, and the states of the session that is continued. */
 export interface OpenedPose extends OpenedScene {
@@ -25,45 +25,45 @@ export interface OpenedPose extends OpenedScene {
  */
 const OWN_PARAMS = { supersample: 2 };
 
-/** Opens meshes in the Sculpt lab, and builds models of them. */
-export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSource, OpenedPose> {
-  protected readonly first = SCENES[0];
+/** Meshes of the Sculpt lab, and how models of them are built. */
+export class SculptData implements LabData<SculptExample, LinkedScene, SceneSource, OpenedPose> {
+  readonly first = SCENES[0];
   readonly #client: SculptClient;
-  readonly #onOpened: (opened: OpenedPose, source: SculptSource) => Promise<void>;
+  readonly #states: LabStates;
+  readonly adopt: (opened: OpenedPose, source: SculptSource) => Promise<void>;
 
+  /** `adopt` displays what was opened. */
   constructor(
     client: SculptClient,
-    ui: SculptParts,
     states: LabStates,
-    onOpened: (opened: OpenedPose, source: SculptSource) => Promise<void>,
+    adopt: (opened: OpenedPose, source: SculptSource) => Promise<void>,
   ) {
-    super(client, ui, states);
     this.#client = client;
-    this.#onOpened = onOpened;
+    this.#states = states;
+    this.adopt = adopt;
   }
 
-  /** Opens a mesh passed on by another lab. */
-  override passedOn({ name, bytes, warnings = [] }: Handoff): Promise<void> {
-    return this.open({ name, load: async () => ({ detail: { file: { name, bytes } } }), isMade: true, warnings });
-  }
-
-  protected find(id: string): SculptExample | undefined {
+  find(id: string): SculptExample | undefined {
     return sceneById(id);
   }
 
-  protected linkedBy(hash: string): LinkedScene | undefined {
+  linkedBy(hash: string): LinkedScene | undefined {
     return fromHash(hash);
   }
 
-  protected fromExample(example: SculptExample): SculptSource {
+  fromExample(example: SculptExample): SculptSource {
     return { name: example.name, load: () => fromExample(example), example };
   }
 
-  protected fromFiles(files: File[]): SculptSource {
+  fromFiles(files: File[]): SculptSource {
     return { name: files.map((file) => file.name).join(' + '), load: () => fromFiles(files) };
   }
 
-  override filesOf({ detail, base }: SceneSource): NamedBytes[] {
+  fromHandoff({ name, bytes, warnings = [] }: Handoff): SculptSource {
+    return { name, load: async () => ({ detail: { file: { name, bytes } } }), isMade: true, warnings };
+  }
+
+  filesOf({ detail, base }: SceneSource): NamedBytes[] {
     const files = [detail, base].flatMap((mesh) => (mesh && 'file' in mesh ? [mesh.file] : []));
     const texture = detail && 'file' in detail ? detail.texture : undefined;
     return texture
@@ -71,7 +71,7 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
       : files;
   }
 
-  protected async load({ name, example, linked, session }: SculptSource, meshes: SceneSource): Promise<OpenedPose> {
+  async load({ name, example, linked, session }: SculptSource, meshes: SceneSource): Promise<OpenedPose> {
     if (session) {
       const { unpackMoments } = await import('../../lab/session/moments');
       const content = contentOf(session, 'sculpt');
@@ -85,16 +85,12 @@ export class SculptOpening extends Opening<SculptExample, LinkedScene, SceneSour
     }
     const support = supportOf(meshes, example, linked);
     if (support === 'membrane' && meshes.detail && !meshes.base)
-      this.states.load(text('sculpt.computingBase', { name }));
+      this.#states.load(text('sculpt.computingBase', { name }));
     const params = { ...(example?.params ?? OWN_PARAMS), ...linked?.params };
     const usual = linked?.keys ? undefined : poseOf(example);
     const start = example?.start ?? (support === 'surface' ? linked?.rest : undefined);
     const setup = { start, params, pose: linked?.pose ?? usual, support };
     return this.#client.request('open', { source: meshes, setup });
-  }
-
-  protected adopt(opened: OpenedPose, source: SculptSource): Promise<void> {
-    return this.#onOpened(opened, source);
   }
 }
 
