@@ -1,4 +1,5 @@
-// Times the surfaces of a label map in a page: on the main thread in slices of work, in `vesicle/worker`, and by the package
+// Times the surfaces of a label map in a page: on the main thread in slices of work, in `vesicle/worker`, by our adapter
+// for Cornerstone3D, and by the package
 // that Cornerstone3D calls for them, in a worker as there. Runs in Node; what a page runs is `window.measureLabels`.
 import { readdir, readFile } from 'node:fs/promises';
 import { launchChromium } from '../scripts/chromium.mjs';
@@ -14,6 +15,7 @@ const POLYSEG = 'node_modules/@icr/polyseg-wasm';
 const WAYS = {
   slices: 'Vesicle, main thread',
   worker: 'Vesicle, vesicle/worker',
+  adapter: 'Vesicle, vesicle/cornerstone',
   polyseg: 'Cornerstone3D, @icr/polyseg-wasm',
 };
 

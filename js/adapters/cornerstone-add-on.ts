@@ -84,6 +84,8 @@ class AddOn {
   readonly #classes: CornerstoneClasses;
   readonly #other: Partial<CornerstoneAddOn> | undefined;
   readonly #known = new Map<string, CornerstoneSurfaces>();
+  /** Ends the creation of the surfaces of a segmentation that is under way. */
+  readonly #making = new Map<string, AbortController>();
   readonly #changed = new Map<string, Changed>();
   #frame: number | undefined;
 
@@ -121,8 +123,7 @@ class AddOn {
     core.eventTarget.removeEventListener(tools.Enums.Events.SEGMENTATION_DATA_MODIFIED, this.#note);
     core.eventTarget.removeEventListener(tools.Enums.Events.SEGMENTATION_REMOVED, this.#remove);
     if (this.#frame !== undefined) cancelAnimationFrame(this.#frame);
-    for (const surfaces of this.#known.values()) surfaces.dispose();
-    this.#known.clear();
+    for (const id of [...this.#known.keys(), ...this.#making.keys()]) this.#forget(id);
   }
 
   #segmentation(id: string): Segmentation | undefined {
@@ -147,9 +148,15 @@ class AddOn {
   };
 
   readonly #remove = ({ detail }: { detail: { segmentationId: string } }): void => {
-    this.#known.get(detail.segmentationId)?.dispose();
-    this.#known.delete(detail.segmentationId);
+    this.#forget(detail.segmentationId);
   };
+
+  #forget(id: string): void {
+    this.#making.get(id)?.abort();
+    this.#making.delete(id);
+    this.#known.get(id)?.dispose();
+    this.#known.delete(id);
+  }
 
   #follow(): void {
     const noted = [...this.#changed];
@@ -161,11 +168,21 @@ class AddOn {
     }
   }
 
-  #compute(id: string): { geometryIds: Map<number, string> } {
+  async #compute(id: string): Promise<{ geometryIds: Map<number, string> }> {
     const volume = this.#classes.tools.utilities.segmentation.getOrCreateSegmentationVolume(id);
-    this.#known.get(id)?.dispose();
-    const surfaces = new CornerstoneSurfaces(this.#classes, volume as CornerstoneVolume);
+    this.#forget(id);
+    const making = new AbortController();
+    this.#making.set(id, making);
+    const { signal } = making;
+    const surfaces = await CornerstoneSurfaces.create(
+      this.#classes,
+      volume as CornerstoneVolume,
+      {},
+      { signal },
+    ).finally(() => signal.aborted || this.#making.delete(id));
     this.#known.set(id, surfaces);
+    // Voxels may have changed meanwhile.
+    surfaces.update();
     return { geometryIds: new Map(surfaces.segments.map((segment) => [segment, this.#cached(id, surfaces, segment)])) };
   }
 

@@ -7,8 +7,10 @@
  */
 import { invalid } from '../check.js';
 import type { VolumeInit, VoxelArray } from '../data.js';
-import type { LabelParams } from '../label-surfaces.js';
+import type { LabelOptions, LabelParams } from '../label-surfaces.js';
 import type { Mesh } from '../mesh.js';
+import { withPause } from '../pause.js';
+import { checkedSlices, type SliceOptions } from '../stepper.js';
 import type { Warning } from '../warning.js';
 import { mergedWarnings } from '../warnings.js';
 import { type LabelClasses, LabelMap } from './label-map.js';
@@ -76,6 +78,11 @@ export interface CornerstoneSurfacesOptions extends LabelParams {
   segments?: number[];
 }
 
+const labelOptions = ({ segments, ...params }: CornerstoneSurfacesOptions): Omit<LabelOptions, 'volume'> => ({
+  ...(segments && { labels: segments }),
+  ...params,
+});
+
 /**
  * The surfaces of a label map in Cornerstone's cache, in the form of its surface representation; they follow the voxels.
  *
@@ -97,14 +104,43 @@ export class CornerstoneSurfaces {
    *   segments that it does not have; `too-large`.
    */
   constructor(classes: LabelClasses, volume: CornerstoneVolume, options: CornerstoneSurfacesOptions = {}) {
-    const { segments, ...params } = options;
     this.#volume = volume;
-    this.#map = new LabelMap(classes, volumeFromCornerstone(volume), {
-      ...(segments && { labels: segments }),
-      ...params,
-    });
-    this.#map.settle();
-    this.#read();
+    if (options instanceof LabelMap) this.#map = options;
+    else {
+      this.#map = LabelMap.make(classes, volumeFromCornerstone(volume), labelOptions(options));
+      this.#map.settle();
+      this.#read();
+    }
+  }
+
+  /**
+   * Creates surfaces as the constructor does, yielding to the event loop between slices of work, and smooths them until they
+   * are settled: those of a large label map take seconds.
+   *
+   * @param slices - `signal`: aborts the creation; `budgetMs`: duration of a slice, milliseconds, default 12.
+   * @throws As the constructor; `signal.reason` when aborted.
+   */
+  static async create(
+    classes: LabelClasses,
+    volume: CornerstoneVolume,
+    options: CornerstoneSurfacesOptions = {},
+    slices?: SliceOptions,
+  ): Promise<CornerstoneSurfaces> {
+    const checked = checkedSlices(slices);
+    const map = await LabelMap.create(classes, volumeFromCornerstone(volume), labelOptions(options), checked);
+    try {
+      const made = new CornerstoneSurfaces(classes, volume, map as CornerstoneSurfacesOptions);
+      await withPause(checked.signal, async (pause) => {
+        for (const segment of made.segments) {
+          made.#readOne(segment);
+          await pause.turn();
+        }
+      });
+      return made;
+    } catch (error) {
+      map.free();
+      throw error;
+    }
   }
 
   /** The frame of reference of the volume, `'unknown'` if it states none, which Cornerstone does not accept. */

@@ -2,7 +2,7 @@
 import { invalid } from '../check.js';
 import type { Vec3, VolumeInit, VoxelArray } from '../data.js';
 import type { LabelOptions, LabelSurfaces } from '../label-surfaces.js';
-import type { StepReport } from '../stepper.js';
+import type { SliceOptions, StepReport } from '../stepper.js';
 import type { Volume } from '../volume.js';
 
 /** The classes of this library that adapters of label maps need: `{ Volume, LabelSurfaces }`, from any entry point. */
@@ -10,6 +10,8 @@ export interface LabelClasses {
   Volume: typeof Volume;
   LabelSurfaces: typeof LabelSurfaces;
 }
+
+type SurfaceOptions = Omit<LabelOptions, 'volume'>;
 
 /** A box of voxels: the index of the first, and their numbers along x, y and z. */
 export interface Region {
@@ -38,19 +40,47 @@ export class LabelMap {
   readonly #dims: Vec3;
   #report: StepReport | undefined;
 
-  /** Copies the voxels of `init`. Throws what `Volume` and `LabelSurfaces` throw. */
-  constructor(classes: LabelClasses, init: VolumeInit, options: Omit<LabelOptions, 'volume'> = {}) {
+  private constructor(surfaces: LabelSurfaces, volume: Volume, known: VoxelArray, [x, y, z]: VolumeInit['dims']) {
+    this.surfaces = surfaces;
+    this.#volume = volume;
+    this.#known = known;
+    this.#dims = [x, y, z];
+  }
+
+  /** Copies the voxels of `init`, and creates their surfaces. Throws what `Volume` and `LabelSurfaces` throw. */
+  static make(classes: LabelClasses, init: VolumeInit, options: SurfaceOptions = {}): LabelMap {
     checkClasses(classes);
-    this.#volume = new classes.Volume(init);
+    const volume = new classes.Volume(init);
     try {
-      this.surfaces = new classes.LabelSurfaces({ volume: this.#volume, ...options });
+      const surfaces = new classes.LabelSurfaces({ volume, ...options });
+      return new LabelMap(surfaces, volume, init.data.slice(), init.dims);
     } catch (error) {
-      this.#volume.free();
+      volume.free();
       throw error;
     }
-    this.#known = init.data.slice();
-    const [x, y, z] = init.dims;
-    this.#dims = [x, y, z];
+  }
+
+  /** Does what {@link make} does, and smooths the surfaces until they are settled, all in slices. */
+  static async create(
+    classes: LabelClasses,
+    init: VolumeInit,
+    options: SurfaceOptions,
+    slices: SliceOptions,
+  ): Promise<LabelMap> {
+    checkClasses(classes);
+    const volume = new classes.Volume(init);
+    const known = init.data.slice();
+    let surfaces: LabelSurfaces | undefined;
+    try {
+      surfaces = await classes.LabelSurfaces.create({ volume, ...options }, slices);
+      const map = new LabelMap(surfaces, volume, known, init.dims);
+      map.#report = await surfaces.run(slices);
+      return map;
+    } catch (error) {
+      surfaces?.free();
+      volume.free();
+      throw error;
+    }
   }
 
   /**

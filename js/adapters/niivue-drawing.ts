@@ -3,6 +3,7 @@ import { invalid } from '../check.js';
 import type { Vec3, VolumeInit } from '../data.js';
 import type { LabelParams } from '../label-surfaces.js';
 import type { Mesh } from '../mesh.js';
+import { type Pause, withPause } from '../pause.js';
 import { type LabelClasses, LabelMap } from './label-map.js';
 import { type Niivue, NiivueSurface, type NVMeshClass } from './niivue-surface.js';
 import { affineOf } from './source.js';
@@ -81,7 +82,8 @@ class DrawingFollower implements FollowedDrawing {
   readonly #shown = new Map<number, { surface: NiivueSurface; color: string }>();
   #map: { labels: LabelMap; grid: string } | undefined;
   #frame: number | undefined;
-  #stopped = false;
+  /** Aborted when the drawing is no longer followed. */
+  readonly #stopping = new AbortController();
   #last: Promise<void> = Promise.resolve();
 
   constructor(nv: Niivue, options: DrawingOptions) {
@@ -111,8 +113,8 @@ class DrawingFollower implements FollowedDrawing {
   }
 
   async stop(): Promise<void> {
-    if (this.#stopped) return;
-    this.#stopped = true;
+    if (this.#isStopped) return;
+    this.#stopping.abort();
     // Uncovers the method of the class.
     delete (this.#nv as Partial<Drawer>).refreshDrawing;
     this.#nv.removeEventListener('drawingChanged', this.#schedule);
@@ -138,8 +140,19 @@ class DrawingFollower implements FollowedDrawing {
     return this.#last;
   }
 
+  get #isStopped(): boolean {
+    return this.#stopping.signal.aborted;
+  }
+
   async #update(): Promise<void> {
-    if (this.#stopped) return;
+    try {
+      if (!this.#isStopped) await this.#follow();
+    } catch (error) {
+      if (!this.#isStopped) throw error;
+    }
+  }
+
+  async #follow(): Promise<void> {
     const init = drawingOf(this.#nv);
     if (!init) return this.#clear();
     const labels = await this.#labelsOf(init);
@@ -161,13 +174,18 @@ class DrawingFollower implements FollowedDrawing {
     await this.#clear();
     const { smoothing, edge } = this.#options;
     const params = { ...(smoothing !== undefined && { smoothing }), ...(edge !== undefined && { edge }) };
-    const labels = new LabelMap(this.#options, init, params);
+    // A large drawing that is loaded takes seconds.
+    const labels = await LabelMap.create(this.#options, init, params, { signal: this.#stopping.signal });
     this.#map = { labels, grid };
     return labels;
   }
 
   /** Updates NiiVue's meshes; returns whether any has changed. */
-  async #show({ surfaces }: LabelMap): Promise<boolean> {
+  #show(labels: LabelMap): Promise<boolean> {
+    return withPause(this.#stopping.signal, (pause) => this.#showInSlices(labels, pause));
+  }
+
+  async #showInSlices({ surfaces }: LabelMap, pause: Pause): Promise<boolean> {
     const wanted = new Set(surfaces.labels);
     let changed = false;
     for (const label of this.#shown.keys()) {
@@ -179,6 +197,7 @@ class DrawingFollower implements FollowedDrawing {
       const mesh = surfaces.mesh(label);
       this.meshes.set(label, mesh);
       if (await this.#surfaceOf(label).update(mesh)) changed = true;
+      await pause.turn();
     }
     return changed;
   }

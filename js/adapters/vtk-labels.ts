@@ -1,8 +1,10 @@
 // Label maps of vtk.js: their surfaces, which follow them, and new ones from volumes.
 import { choice, invalid } from '../check.js';
 import type { Space, VoxelArray } from '../data.js';
-import type { LabelParams } from '../label-surfaces.js';
+import type { LabelOptions, LabelParams } from '../label-surfaces.js';
 import type { Mesh } from '../mesh.js';
+import { withPause } from '../pause.js';
+import { checkedSlices, type SliceOptions } from '../stepper.js';
 import type { Volume } from '../volume.js';
 import type { Warning } from '../warning.js';
 import { mergedWarnings } from '../warnings.js';
@@ -19,6 +21,18 @@ export interface VtkLabelSurfacesOptions extends LabelParams {
    * the origin for its size: the actors are moved to the origins of the surfaces.
    */
   actorOf?: (label: number) => VtkActor;
+}
+
+const labelOptions = ({ actorOf: _, ...options }: VtkLabelSurfacesOptions): Omit<LabelOptions, 'volume'> => options;
+
+/** Surfaces that are created already, for the constructor. */
+class Made {
+  readonly map: LabelMap;
+  readonly actorOf: VtkLabelSurfacesOptions['actorOf'];
+
+  constructor(map: LabelMap, actorOf: VtkLabelSurfacesOptions['actorOf']) {
+    [this.map, this.actorOf] = [map, actorOf];
+  }
 }
 
 /**
@@ -48,22 +62,45 @@ export class VtkLabelSurfaces<P extends VtkPolyData> {
    *   that it does not have; `precision`: an image so far from the origin that single precision is too coarse there,
    *   without `actorOf`; `too-large`.
    */
-  constructor(
+  constructor(classes: VtkClasses<P> & LabelClasses, image: VtkImage, options: VtkLabelSurfacesOptions = {}) {
+    this.#vtk = checkedVtk(classes);
+    this.#image = image;
+    this.#actorOf = options.actorOf;
+    if (options instanceof Made) this.#map = options.map;
+    else {
+      this.#map = LabelMap.make(classes, volumeFromVtk(image), labelOptions(options));
+      this.#map.settle();
+      this.#showAtOnce();
+    }
+  }
+
+  /**
+   * Creates surfaces as the constructor does, yielding to the event loop between slices of work, and smooths them until they
+   * are settled: those of a large label map take seconds.
+   *
+   * @param slices - `signal`: aborts the creation; `budgetMs`: duration of a slice, milliseconds, default 12.
+   * @throws As the constructor; `signal.reason` when aborted.
+   */
+  static async create<P extends VtkPolyData>(
     classes: VtkClasses<P> & LabelClasses,
     image: VtkImage,
-    { actorOf, ...options }: VtkLabelSurfacesOptions = {},
-  ) {
-    // Checks the classes of vtk.js.
-    new VtkSurface(classes).dispose();
-    this.#vtk = classes;
-    this.#actorOf = actorOf;
-    this.#image = image;
-    this.#map = new LabelMap(classes, volumeFromVtk(image), options);
-    this.#map.settle();
+    options: VtkLabelSurfacesOptions = {},
+    slices?: SliceOptions,
+  ): Promise<VtkLabelSurfaces<P>> {
+    checkedVtk(classes);
+    const checked = checkedSlices(slices);
+    const map = await LabelMap.create(classes, volumeFromVtk(image), labelOptions(options), checked);
+    const surfaces = new VtkLabelSurfaces(classes, image, new Made(map, options.actorOf) as VtkLabelSurfacesOptions);
     try {
-      this.#show();
+      await withPause(checked.signal, async (pause) => {
+        for (const label of surfaces.labels) {
+          surfaces.#surfaceOf(label);
+          await pause.turn();
+        }
+      });
+      return surfaces;
     } catch (error) {
-      this.dispose();
+      surfaces.dispose();
       throw error;
     }
   }
@@ -107,6 +144,15 @@ export class VtkLabelSurfaces<P extends VtkPolyData> {
     return this.#show() || followed !== undefined;
   }
 
+  #showAtOnce(): void {
+    try {
+      this.#show();
+    } catch (error) {
+      this.dispose();
+      throw error;
+    }
+  }
+
   #show(): boolean {
     for (const label of this.labels) this.#surfaceOf(label);
     let changed = false;
@@ -131,6 +177,12 @@ export class VtkLabelSurfaces<P extends VtkPolyData> {
     this.#made.clear();
     this.#map.free();
   }
+}
+
+/** Returns the classes of vtk.js; throws `invalid-argument` if some are missing. */
+function checkedVtk<P extends VtkPolyData>(classes: VtkClasses<P>): VtkClasses<P> {
+  new VtkSurface(classes).dispose();
+  return classes;
 }
 
 /** The classes of vtk.js that {@link vtkFromVolume} needs: `{ vtkImageData, vtkDataArray }`. */

@@ -35,7 +35,7 @@ pub(super) fn is_metaimage(bytes: &[u8]) -> bool {
 /// # Errors
 /// [`FormatError`] that names the header field at fault.
 pub(super) fn parse(bytes: &[u8], options: &VolumeOptions<'_>) -> Result<Volume, FormatError> {
-    let mut lines = Lines::new(bytes);
+    let mut lines = Lines::new(FORMAT, bytes);
     let fields = Fields::read(&mut lines)?;
     let header = Header::check(&fields)?;
     let file = fields.need("ElementDataFile")?;
@@ -105,7 +105,7 @@ impl Fields {
     /// Reads the `key = value` lines of the header, up to and including the one that names the data file.
     fn read(lines: &mut Lines<'_>) -> Result<Self, FormatError> {
         let mut fields = Self { pairs: Vec::new(), is_sequence: false };
-        while let Some(line) = lines.next_line() {
+        while let Some(line) = lines.next_line()? {
             if line.trim().is_empty() {
                 continue;
             }

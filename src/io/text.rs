@@ -56,48 +56,63 @@ pub(super) fn without_byte_order_mark(bytes: &[u8]) -> Option<Cow<'_, [u8]>> {
     }
 }
 
-/// Maximum length of the text header of a volume file, in bytes; real ones have a few kilobytes.
-const MAX_HEADER: usize = 1 << 20;
+/// Maximum length of the text header of a volume file, in bytes; most have a few kilobytes, and those of segmentations some
+/// 200 bytes for each segment.
+const MAX_HEADER: usize = 16 << 20;
+
+/// Maximum length of the names of the files beside a header, in bytes.
+const MAX_NAMES: usize = 1 << 20;
 
 /// Iterator over the lines of a volume file's text header, which then gives access to the bytes after it.
 pub(super) struct Lines<'a> {
+    format: &'static str,
     bytes: &'a [u8],
     at: usize,
 }
 
 impl<'a> Lines<'a> {
-    pub(super) fn new(bytes: &'a [u8]) -> Self {
-        Self { bytes, at: 0 }
+    pub(super) fn new(format: &'static str, bytes: &'a [u8]) -> Self {
+        Self { format, bytes, at: 0 }
     }
 
-    /// Returns the next line without its ending (\n or \r\n); `None` at the end of the file or at the maximum length of
-    /// a header.
-    pub(super) fn next_line(&mut self) -> Option<String> {
-        let end = if self.bytes.len() < MAX_HEADER { self.bytes.len() } else { MAX_HEADER };
-        let rest = self.bytes.get(self.at..end).filter(|rest| !rest.is_empty())?;
-        let length = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
+    /// Returns the next line without its ending (\n or \r\n); `None` at the end of the file.
+    ///
+    /// # Errors
+    /// The line goes beyond the maximum length of a header.
+    pub(super) fn next_line(&mut self) -> Result<Option<String>, FormatError> {
+        let Some(rest) = self.bytes.get(self.at..).filter(|rest| !rest.is_empty()) else { return Ok(None) };
+        let within = &rest[..rest.len().min(MAX_HEADER.saturating_sub(self.at))];
+        let length = match within.iter().position(|&b| b == b'\n') {
+            Some(length) => length,
+            None if within.len() == rest.len() => rest.len(),
+            None => {
+                let problem = format!("must have at most {} MiB", MAX_HEADER >> 20);
+                return Err(FormatError::invalid(self.format, "header", problem));
+            }
+        };
         self.at += length + 1;
-        Some(String::from_utf8_lossy(&rest[..length]).trim_end_matches('\r').to_owned())
+        Ok(Some(String::from_utf8_lossy(&rest[..length]).trim_end_matches('\r').to_owned()))
     }
 
     /// Returns the names of data files on the lines that follow, one on each; `field` starts the list.
     ///
     /// # Errors
-    /// No names, or a list beyond the maximum length of a header.
+    /// No names, or too many.
     pub(super) fn names(&mut self, field: &Field<'_>) -> Result<DataFiles, FormatError> {
+        if self.bytes.len().saturating_sub(self.at) > MAX_NAMES {
+            return Err(field.invalid("has too many files"));
+        }
         let mut names = Vec::new();
-        while let Some(line) = self.next_line() {
+        while let Some(line) = self.next_line()? {
             let name = line.trim();
             if !name.is_empty() {
                 names.push(name.to_owned());
             }
         }
-        let problem = match names.is_empty() {
-            true => "must be followed by the names of files",
-            false if self.at < self.bytes.len() => "has too many files",
-            false => return Ok(DataFiles::Names(names)),
-        };
-        Err(field.invalid(problem))
+        if names.is_empty() {
+            return Err(field.invalid("must be followed by the names of files"));
+        }
+        Ok(DataFiles::Names(names))
     }
 
     /// Returns the bytes after the header lines read so far, where the voxels start.

@@ -97,7 +97,11 @@ test.each([
     data.faults.set('bad', fault);
     await opening.files(files);
     await opening.session(named('bad', 'other'), []);
-    expect(page).toMatchObject({ shown: 'mine', message: `bad could not be opened. ${fault.message}`, restarts });
+    expect(page).toMatchObject({
+      shown: 'mine',
+      message: `The session with bad could not be opened. ${fault.message}`,
+      restarts,
+    });
     expect(opening.source?.name).toBe('mine');
     expect(page.states.value).toBe('paused');
     await opening.session(named('good', 'other'), []);
@@ -113,7 +117,7 @@ test('after a session that cannot be shown in a lab with nothing open, the first
   data.faults.set('bad', new Error('no'));
   await opening.session(named('bad', 'other'), []);
   expect(page.shown).toBe('first');
-  expect(page.message).toContain('bad could not be opened');
+  expect(page.message).toContain('The session with bad could not be opened');
 });
 
 test('the first data can be cancelled from the beginning, unless there is nothing else to open', async () => {

@@ -314,6 +314,25 @@ test('a volume that looks like a label map is one, too, but a mask may be an ima
   expect(await opened((_, index) => index % 7)).toEqual([0, 0]);
 });
 
+test('a volume whose name alone says that it is a label map opens as an image, and says so', async () => {
+  await init();
+  const data = Uint8Array.from({ length: 16 ** 3 }, (_, i) => i % 7);
+  const warnings = async (name: string, values: Uint8Array | Float32Array = data) => {
+    const bytes = new Volume({ data: values, dims: [16, 16, 16] }).toNifti();
+    return (await openImage({ files: [{ name, bytes }] } as never)).map.warnings;
+  };
+  expect(await warnings('labels.nii')).toMatchObject([
+    { code: 'reader', text: expect.stringContaining('labels.nii is open as an image') },
+  ]);
+  expect(await warnings('a.nii')).toEqual([]);
+  expect(
+    await warnings(
+      'labels.nii',
+      Float32Array.from(data, (one) => one + 0.5),
+    ),
+  ).toEqual([]);
+});
+
 test('a label map of more labels than the list can show is refused', async () => {
   await init();
   const side = 17;

@@ -11,7 +11,7 @@ import { changedRegion } from '../../pkg/adapters/label-map.js';
 import { followDrawing } from '../../pkg/adapters/niivue.js';
 import { Outline } from '../../pkg/adapters/niivue-outline.js';
 import { VtkLabelSurfaces, volumeFromVtk, vtkFromVolume } from '../../pkg/adapters/vtk.js';
-import { LabelSurfaces, Mesh, type Vec3, Volume } from '../../pkg/index.js';
+import { LabelSurfaces, Mesh, type SliceOptions, type Vec3, Volume } from '../../pkg/index.js';
 import { failure, rejection, wrong } from './helpers.js';
 
 const SIZE: Vec3 = [14, 12, 10];
@@ -517,5 +517,94 @@ test('Cornerstone: the add-on converts a label map once, and then follows events
   eventTarget.dispatchEvent(Object.assign(new Event('removed'), { detail: { segmentationId: 'heart' } }));
   expect(addOn.surfaces('heart')).toBeUndefined();
   addOn.dispose();
+  vi.unstubAllGlobals();
+});
+
+test('Cornerstone: what changes while the surfaces are created is followed, and a removal ends their creation', async () => {
+  frames();
+  const labels = labelMap();
+  const { core, tools, eventTarget } = cornerstone(labels);
+  const addOn = cornerstoneAddOn({ ...classes, core, tools });
+  addOn.init();
+  const making = addOn.computeSurfaceData('heart');
+  box(labels, 2, [9, 6, 1], [12, 9, 6]);
+  await making;
+  expect(contained(addOn.surfaces('heart')?.mesh(2), cornerstoneWorld([10, 7, 3]))).toEqual([true]);
+  const again = addOn.computeSurfaceData('heart');
+  expect(addOn.surfaces('heart')).toBeUndefined();
+  eventTarget.dispatchEvent(Object.assign(new Event('removed'), { detail: { segmentationId: 'heart' } }));
+  await expect(again).rejects.toThrow(/abort/);
+  expect(addOn.surfaces('heart')).toBeUndefined();
+  const last = addOn.computeSurfaceData('heart');
+  addOn.dispose();
+  await expect(last).rejects.toThrow(/abort/);
+  vi.unstubAllGlobals();
+});
+
+// ── In slices
+
+/** Returns the adapters of label maps, created in slices: the surface of a label, and an update after changes. */
+const inSlices = {
+  'vtk.js': async (labels: Uint8Array, slices: SliceOptions) => {
+    const image = vtkImage(labels);
+    const made = await VtkLabelSurfaces.create({ ...classes, ...vtk }, image, {}, slices);
+    const shown = (label: number) => [...wrong(made.polyData(label)).getPoints().getData()];
+    return { made, shown, world: ([x, y, z]: Vec3) => image.indexToWorld([x + 2, y - 3, z + 5]) };
+  },
+  Cornerstone: async (labels: Uint8Array, slices: SliceOptions) => {
+    const made = await CornerstoneSurfaces.create(classes, cornerstoneVolume(labels), {}, slices);
+    return { made, shown: (label: number) => [...made.geometry(label).points], world: cornerstoneWorld };
+  },
+};
+
+test.each(['vtk.js', 'Cornerstone'] as const)('%s: surfaces are created in slices, and follow', async (host) => {
+  const labels = labelMap();
+  let turns = 0;
+  let isMade = false;
+  const count = () => {
+    turns++;
+    if (!isMade) setImmediate(count);
+  };
+  count();
+  const { made, shown, world } = await inSlices[host](labels, { budgetMs: 0.001 });
+  isMade = true;
+  expect(turns).toBeGreaterThan(10);
+  const check = () => agree(labels, (label) => made.mesh(label), world);
+  check();
+  for (const label of [1, 2]) expect(shown(label)).toEqual([...made.mesh(label).arrays().positions]);
+  // They are settled: nothing is left to do.
+  const before = shown(1);
+  made.update();
+  expect(shown(1)).toEqual(before);
+  box(labels, 2, [9, 6, 7], [12, 9, 9]);
+  made.update();
+  check();
+  made.dispose();
+});
+
+test.each(['vtk.js', 'Cornerstone'] as const)('%s: the creation can be aborted', async (host) => {
+  const reason = new Error('closed');
+  const aborting = new AbortController();
+  const making = inSlices[host](labelMap(), { signal: aborting.signal, budgetMs: 0.001 });
+  setImmediate(() => aborting.abort(reason));
+  await expect(making).rejects.toBe(reason);
+  await expect(inSlices[host](labelMap(), { signal: aborting.signal })).rejects.toBe(reason);
+  expect((await rejection(inSlices[host](labelMap(), { budgetMs: -1 }))).message).toMatch(/budgetMs/);
+});
+
+test('NiiVue: a drawing that is no longer followed while its surfaces are created is no error', async () => {
+  const run = frames();
+  const matRAS = Float32Array.of(...[1, 0, 0, 0, 0, 1, 0, 0], ...[0, 0, 1, 0, 0, 0, 0, 1]);
+  const nv = new Drawer({ dimsRAS: [3, 6, 6, 6], matRAS });
+  const errors: unknown[] = [];
+  const onError = (error: unknown) => errors.push(error);
+  const drawing = followDrawing(wrong(nv), { ...classes, NVMesh: wrong(NVMesh), outline: 0, onError });
+  nv.drawBitmap = Uint8Array.from({ length: 216 }, (_, i) => Number(i % 6 > 1 && i % 6 < 4 && i > 80 && i < 140));
+  nv.refreshDrawing();
+  run();
+  const update = drawing.update();
+  await drawing.stop();
+  await update;
+  expect([errors, nv.meshes.length, drawing.meshes.size]).toEqual([[], 0, 0]);
   vi.unstubAllGlobals();
 });

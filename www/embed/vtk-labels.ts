@@ -25,7 +25,7 @@ await status(async (say) => {
 
   await init();
   const classes = { Volume, LabelSurfaces, vtkPolyData, vtkDataArray };
-  const surfaces = new VtkLabelSurfaces(classes, labelMap);
+  const surfaces = await VtkLabelSurfaces.create(classes, labelMap);
   const actors = LABELS.map(({ value, color }) => actorOf(surfaces.polyData(value), [...color]));
   const render = sliceAndSurfaces(image(voxels), actors, [-0.4, -1.2, -1.2], 2.2);
   render();

@@ -52,7 +52,7 @@ pub(super) struct Fields {
 impl Fields {
     /// Reads the header fields up to the blank line, or to the end of a detached header.
     pub(super) fn read(lines: &mut Lines<'_>) -> Result<Self, FormatError> {
-        let magic = lines.next_line().unwrap_or_default();
+        let magic = lines.next_line()?.unwrap_or_default();
         if !matches!(magic.as_str(), "NRRD0001" | "NRRD0002" | "NRRD0003" | "NRRD0004" | "NRRD0005") {
             let shown: String = magic.chars().take(12).collect();
             return Err(FormatError::unsupported(
@@ -63,7 +63,7 @@ impl Fields {
             ));
         }
         let mut fields = Self { pairs: Vec::new(), comment: String::new(), has_itk_key: false };
-        while let Some(line) = lines.next_line() {
+        while let Some(line) = lines.next_line()? {
             if line.is_empty() {
                 break;
             }

@@ -49,7 +49,7 @@ pub(super) fn is_nrrd(bytes: &[u8]) -> bool {
 /// # Errors
 /// [`FormatError`] that names the header field at fault.
 pub(super) fn parse(bytes: &[u8], options: &VolumeOptions<'_>) -> Result<Volume, FormatError> {
-    let mut lines = Lines::new(bytes);
+    let mut lines = Lines::new(FORMAT, bytes);
     let fields = Fields::read(&mut lines)?;
     let header = Header::check(&fields, options.space)?;
     match fields.get("datafile") {

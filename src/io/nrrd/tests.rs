@@ -220,3 +220,18 @@ fn axes_that_contradict_each_other_are_refused() {
     let lengths = "sizes: 99999999999 2 99999999999 99999999999";
     assert!(grid(&["dimension: 4", lengths, "kinds: domain list domain domain"]).is_err());
 }
+
+#[test]
+fn a_header_is_read_to_its_end_or_refused() {
+    // As of a segmentation with thousands of segments; a comment goes beyond the limit.
+    let file = |keys: usize| {
+        let fields = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 1 1\nencoding: raw\n";
+        let segments: String =
+            (0..keys).map(|i| format!("# Segment{i}_Name:={}\n", "x".repeat(1000))).collect();
+        [fields.as_bytes(), segments.as_bytes(), b"\n", &[7, 9]].concat()
+    };
+    let volume = parse(&file(5000), None).expect("a header of 5 MB");
+    assert_eq!(volume.intensities(0).unwrap(), [7.0, 9.0]);
+    let message = parse(&file(17_000), None).expect_err("a header of 17 MB").to_string();
+    assert_eq!(message, "NRRD: header: must have at most 16 MiB");
+}

@@ -20,6 +20,11 @@ export class Refusal extends Error {
  */
 export function toFailure(error: unknown): Failure {
   const isKnown = error instanceof VesicleError || error instanceof Refusal;
-  if (isKnown && error.code !== 'crash') return { code: error.code, message: error.message };
+  if (isKnown && error.code !== 'crash') return { code: error.code, message: forUsers(error.message) };
   return { code: 'internal', message: error instanceof Error ? error.message : String(error) };
+}
+
+/** Returns a message of the library without what only those who call it can do. */
+function forUsers(message: string): string {
+  return message.replace(/:? \(?free\(\) what is no longer needed\)?/, '');
 }

@@ -7,7 +7,7 @@ import type { KnownLabel, Label } from './labels';
 import type { Vec3 } from './protocol';
 
 /** Number of bytes within which the header of a NRRD file has to end. */
-const MOST_HEADER = 4_000_000;
+const MOST_HEADER = 16 * 2 ** 20;
 const FIELD = /^Segment(\d+)_(Name|LabelValue|Color):=(.*)$/;
 
 /** Returns what a NRRD file says of its labels; nothing for other files. */

@@ -414,7 +414,7 @@ export class Opening<Example, Linked extends { example?: string; file?: string }
       return this.#openWithoutLink(source, message);
     this.#ui.data.choose(this.#source?.example);
     this.#lab.kept?.(this.#source);
-    const title = text('labs.openFailed', { name: source.name });
+    const title = titleOf(source);
     if (this.#modelMismatch) {
       this.#states.engineBroken = true;
       if (code !== 'internal' && this.#source && !reopening) return this.#openPrevious(title, message);
@@ -446,8 +446,7 @@ export class Opening<Example, Linked extends { example?: string; file?: string }
     const opening = this.open(this.#source ?? this.#lab.fromExample(this.#lab.first));
     const own = this.#requestCount;
     await opening;
-    if (own === this.#requestCount && this.#states.value !== 'error')
-      this.#ui.banner.show(text('labs.openFailed', { name: failed.name }), message);
+    if (own === this.#requestCount && this.#states.value !== 'error') this.#ui.banner.show(titleOf(failed), message);
   }
 
   /** Opens a link's example or file without the link's settings, after one of them was rejected, and says why. */
@@ -482,5 +481,9 @@ export class Opening<Example, Linked extends { example?: string; file?: string }
     this.#states.engineBroken = false;
   }
 }
+
+/** Returns what the banner says when a source cannot be opened. */
+const titleOf = ({ name, session }: Pick<Source<never, never, never>, 'name' | 'session'>): string =>
+  text(session ? 'sessions.openFailed' : 'labs.openFailed', { name });
 
 const later = (milliseconds: number) => new Promise((resolve) => setTimeout(resolve, milliseconds));

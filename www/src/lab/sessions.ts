@@ -92,7 +92,7 @@ export class Sessions<Example extends { id: string }> {
     const opened = session ? this.#open(session) : captured && this.#bringBack(captured);
     return opened?.catch(async (error) => {
       if (!opening.source) await opening.default();
-      states.fail(text('labs.openFailed', { name }), error);
+      states.fail(text('sessions.openFailed', { name }), error);
     });
   }
 

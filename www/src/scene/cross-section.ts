@@ -10,32 +10,38 @@ export function crossSection(
   { origin, normal }: Plane,
 ): PointArray {
   const heights = new Float32Array(vertices);
+  const above = new Uint8Array(vertices);
+  const [nx, ny, nz] = normal;
   const [x, y, z] = origin.map((value, axis) => value - (from[axis] ?? 0)) as Vec3;
-  const offset = normal[0] * x + normal[1] * y + normal[2] * z;
-  let below = 0;
-  for (let i = 0; i < vertices; i++) {
+  const offset = nx * x + ny * y + nz * z;
+  let count = 0;
+  for (let v = 0, i = 0; v < vertices; v++, i += 3) {
     const height =
-      normal[0] * (positions[3 * i] ?? 0) +
-      normal[1] * (positions[3 * i + 1] ?? 0) +
-      normal[2] * (positions[3 * i + 2] ?? 0) -
-      offset;
+      nx * (positions[i] as number) + ny * (positions[i + 1] as number) + nz * (positions[i + 2] as number);
+    heights[v] = height - offset;
     // A vertex in the plane counts as above it, so that each triangle is cut twice or not at all.
-    heights[i] = height === 0 ? 1e-12 : height;
-    if (height < 0) below += 1;
+    if (height < offset) continue;
+    above[v] = 1;
+    count += 1;
   }
-  if (below === 0 || below === vertices) return new Float32Array();
+  if (count === 0 || count === vertices) return new Float32Array();
   const out: number[] = [];
-  for (let i = 0; i < 3 * triangles; i += 3) {
-    for (let side = 0; side < 3; side++) {
-      const [a, b] = [indices[i + side] ?? 0, indices[i + ((side + 1) % 3)] ?? 0];
-      const [here, there] = [heights[a] ?? 0, heights[b] ?? 0];
-      if (here > 0 === there > 0) continue;
-      const part = here / (here - there);
-      for (let k = 0; k < 3; k++) {
-        const [x, y] = [positions[3 * a + k] ?? 0, positions[3 * b + k] ?? 0];
-        out.push(x + part * (y - x));
-      }
+  const cut = (a: number, b: number) => {
+    if (above[a] === above[b]) return;
+    const here = heights[a] as number;
+    const part = here / (here - (heights[b] as number));
+    for (let k = 0; k < 3; k++) {
+      const first = positions[3 * a + k] as number;
+      out.push(first + part * ((positions[3 * b + k] as number) - first));
     }
+  };
+  for (let i = 0; i < 3 * triangles; i += 3) {
+    const [a, b, c] = [indices[i] as number, indices[i + 1] as number, indices[i + 2] as number];
+    const corners = (above[a] as number) + (above[b] as number) + (above[c] as number);
+    if (corners === 0 || corners === 3) continue;
+    cut(a, b);
+    cut(b, c);
+    cut(c, a);
   }
   return inWorld(Float32Array.from(out), from);
 }

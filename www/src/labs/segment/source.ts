@@ -55,7 +55,9 @@ export async function openImage({ files, labelling }: ImageSource, isSmall = fal
   if (isSmall) checkSmallImage(image.init);
   const volume = new Volume(image.init);
   try {
-    const labels = map ? labelsOf(map, volume, map === image) : computed(volume, labelling);
+    const labels = map
+      ? labelsOf(map, volume, map === image)
+      : { ...computed(volume, labelling), warnings: doubts(image) };
     const voxels = volume.frames === 1 ? displayed(image.init, volume.range) : undefined;
     return { volume, map: labels, unit: image.init.unit, looksLike, voxels };
   } catch (error) {
@@ -112,6 +114,13 @@ function alone(image: NamedVolume): Both {
   // Unless its name tells, a mask may as well be an image of two intensities.
   if (looksLike === 1 && isNamed(image)) return { image, map: image, looksLike: 0 };
   return { image, map: looksLike > 1 ? image : undefined, looksLike };
+}
+
+/** Returns what to know of a volume that is open without its labels. */
+function doubts(image: NamedVolume): Warning[] {
+  if (!isNamed(image) || !hasIntegers(image)) return [];
+  const { name } = image;
+  return [{ code: 'reader', text: text('segment.openedAsImage', { name, button: text('segment.openMap') }) }];
 }
 
 /** Reads a label map, or what may be one, with what its file says of the labels. */
@@ -246,10 +255,10 @@ const LABELLINGS: Record<Labelling, (intensities: Float32Array, dims: Vec3) => U
 };
 
 /** Returns the label map of a volume without one: computed from its intensities, or empty. */
-function computed(volume: Volume, labelling: Labelling | undefined): OpenMap {
+function computed(volume: Volume, labelling: Labelling | undefined): Omit<OpenMap, 'warnings'> {
   const { dims } = volume;
   const voxels = labelling
     ? LABELLINGS[labelling](volume.intensities(), dims)
     : new Uint8Array(dims[0] * dims[1] * dims[2]);
-  return { voxels, known: [], file: undefined, warnings: [] };
+  return { voxels, known: [], file: undefined };
 }
