@@ -4,6 +4,7 @@ import { randomNumbers } from '../../bench/random.mjs';
 import init, { Volume } from '../../pkg/index.js';
 import type { LabelArray } from '../../www/src/engine/labels';
 import { freeValue, newLabel, rangeOf, rgbOf } from '../../www/src/engine/labels';
+import { withLabels } from '../../www/src/engine/slicer';
 import { UndoStack } from '../../www/src/lab/undo';
 import { flood, floodBox, sweep } from '../../www/src/labs/segment/brush';
 import { SegmentEditing } from '../../www/src/labs/segment/editing';
@@ -344,4 +345,18 @@ test('a label map of more labels than the list can show is refused', async () =>
   const { map } = await opened(4001);
   expect(Math.max(...map.voxels)).toBe(4000);
   await expect(opened(4002)).rejects.toThrow('4001 labels; the app shows at most 4000');
+});
+
+test('labels that a small file describes count, even without voxels', async () => {
+  await init();
+  const data = Uint16Array.from({ length: 512 }, (_, i) => Number(i > 300));
+  const opened = (count: number, isSmall: boolean) => {
+    const labels = Array.from({ length: count }, (_, i) => ({ value: i + 1, name: `part ${i}`, color: '#ff0000' }));
+    const bytes = withLabels(new Volume({ data, dims: [8, 8, 8] }).toBytes('nrrd'), labels, [8, 8, 8]);
+    return openImage({ files: [{ name: 'a.seg.nrrd', bytes }] } as never, isSmall);
+  };
+  expect((await opened(400, true)).map.known.length).toBe(400);
+  await expect(opened(401, true)).rejects.toThrow('401');
+  expect((await opened(401, false)).map.known.length).toBe(401);
+  await expect(opened(4001, false)).rejects.toThrow('4001 labels; the app shows at most 4000');
 });

@@ -7,6 +7,7 @@ import { labelsLike } from '../../engine/likeness';
 import type { Intensities } from '../../engine/protocol';
 import { Refusal } from '../../engine/refusal';
 import { labelsIn } from '../../engine/slicer';
+import { tooManyLabels } from '../../engine/small-files';
 import { checkSmallImage, displayed, readFiles } from '../../engine/volumes';
 import { merged, type Warning } from '../../engine/warnings';
 import { invert, toWorld } from '../../scene/anatomy';
@@ -56,7 +57,7 @@ export async function openImage({ files, labelling }: ImageSource, isSmall = fal
   const volume = new Volume(image.init);
   try {
     const labels = map
-      ? labelsOf(map, volume, map === image)
+      ? labelsOf(map, volume, { isBoth: map === image, isSmall })
       : { ...computed(volume, labelling), warnings: doubts(image) };
     const voxels = volume.frames === 1 ? displayed(image.init, volume.range) : undefined;
     return { volume, map: labels, unit: image.init.unit, looksLike, voxels };
@@ -67,11 +68,11 @@ export async function openImage({ files, labelling }: ImageSource, isSmall = fal
 }
 
 /** Reads a label map; throws if it is none, or does not have the grid of `volume`. */
-export async function openLabels(files: NamedBytes[], volume: Volume): Promise<OpenMap> {
+export async function openLabels(files: NamedBytes[], volume: Volume, isSmall: boolean): Promise<OpenMap> {
   const groups = groupFiles(files);
   const [first] = groups;
   if (!first || groups.length !== 1) throw new Refusal('bad-file', text('segment.oneLabelMap'));
-  return labelsOf(await readMap(first), volume);
+  return labelsOf(await readMap(first), volume, { isBoth: false, isSmall });
 }
 
 /** Returns the label map as a volume in the geometry of another one, with the warnings of both. */
@@ -159,12 +160,19 @@ function valuesIn({ init: { data } }: NamedVolume): number {
  * Returns the label map in the grid of a volume, in the type of its file unless this has slope and intercept; `isBoth` if
  * the volume was made of it.
  */
-function labelsOf({ name, init, known, isCropped }: NamedVolume, volume: Volume, isBoth = false): OpenMap {
+function labelsOf(
+  { name, init, known, isCropped }: NamedVolume,
+  volume: Volume,
+  { isBoth, isSmall }: { isBoth: boolean; isSmall: boolean },
+): OpenMap {
   const map = isBoth ? volume : new Volume(init);
   try {
     if (!isCropped) requireSameGrid(map, volume);
     // Says what is wrong with voxels that are no labels.
-    const labels = map.labels().length;
+    // Those that are described are listed, too.
+    const labels = new Set([...map.labels(), ...known].map(({ value }) => value)).size;
+    const refusal = isSmall && tooManyLabels(labels);
+    if (refusal) throw new Refusal('too-large', refusal);
     if (labels > MOST_OPENED) throw new Refusal('too-large', text('segment.tooMany', { labels, most: MOST_OPENED }));
     const count = map.dims.reduce((product, size) => product * size, 1);
     const isPlain = (init.slope ?? 1) === 1 && (init.intercept ?? 0) === 0;

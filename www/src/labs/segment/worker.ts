@@ -199,9 +199,10 @@ class Session {
   async #openLabels(files: Requests['openLabels']['body']['files']): Promise<OpenedLabels> {
     const began = performance.now();
     const image = this.#image();
-    const opened = await openLabels(files, image.volume);
+    const isSmall = areSmall(files);
+    const opened = await openLabels(files, image.volume, isSmall);
     const params = { ...this.#current().surfaces.params };
-    const live = new LiveMap(image, opened.voxels, opened.warnings, params, { isSmall: areSmall(files) });
+    const live = new LiveMap(image, opened.voxels, opened.warnings, params, { isSmall });
     this.#adopt(live);
     const all = this.#all(live, opened, began);
     return withTransfer(all, [...arraysOf(all), all.voxels]);
