@@ -1,6 +1,6 @@
 // Runs the benches of all methods in Node and Chromium and, for those that have a native program, natively; measures
 // the app in Chromium; and compares with other software. Prints tables and writes bench.json. `npm run bench -- points`
-// runs a single bench and writes nothing. `hosts` and `tools` run only when they are named; `tools` writes the figures of
+// runs a single bench and writes nothing. `hosts`, `latency` and `tools` run only when they are named; `tools` writes the figures of
 // docs/performance.md.
 import { readFile, writeFile } from 'node:fs/promises';
 import { cpus } from 'node:os';
@@ -76,6 +76,15 @@ const BENCHES = {
       return (await import('../bench/hosts.mjs')).measure(at('dist'));
     },
     rows: hostRows,
+  },
+  latency: {
+    // The app's ways from a click or a movement of the pen to the picture; not part of the report.
+    apart: true,
+    alone: async () => {
+      await buildApp();
+      return (await import('../bench/latency.mjs')).measure(at('dist'));
+    },
+    rows: latencyRows,
   },
   tools: {
     // For docs/performance.md; not part of the report.
@@ -169,6 +178,24 @@ function strokeRows({ host, rows }) {
     `longest ${longest.toFixed(1)} ms; marching cubes of all labels ${(full / median).toFixed(1)} times the median`,
   ];
   return [[host, '', 'median of the strokes of a brush, settled'], ...rows.map(row)];
+}
+
+function latencyRows({ host, step, stroke }) {
+  return [
+    [host, '', 'medians'],
+    [
+      '  step to picture',
+      `${step.milliseconds.toFixed(0)} ms`,
+      `${step.requests} messages there, ${step.answers} back; ${step.triangles} triangles: ${step.uploads.toFixed(1)} MB to the GPU, ` +
+        `${step.copied.toFixed(1)} MB copied before`,
+    ],
+    [
+      '  pen to slice',
+      `${stroke.slice.toFixed(0)} ms`,
+      `${stroke.draws.toFixed(1)} images drawn on slices for each movement`,
+    ],
+    ['  pen lifted to smooth surfaces', `${stroke.surfaces.toFixed(0)} ms`, `${stroke.requests} messages a stroke`],
+  ];
 }
 
 function skinRows({ host, rows }) {

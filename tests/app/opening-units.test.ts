@@ -2,7 +2,7 @@
 import { expect, test } from 'vitest';
 import { RequestError } from '../../www/src/engine/channel';
 import { type LabData, Opening, type Source } from '../../www/src/lab/opening';
-import type { Session } from '../../www/src/lab/session/file';
+import type { Session } from '../../www/src/lab/session/check';
 import { LabStates } from '../../www/src/lab/states';
 
 type Example = { id: string };

@@ -1,10 +1,10 @@
 /** Links and sessions of the Reconstruct lab from before parameters were chosen from the points. */
 import { expect, test } from 'vitest';
-import type { ContentOf } from '../../www/src/lab/session/schema';
 import { completed } from '../../www/src/labs/reconstruct/before';
 import { CLOUDS, PAPER } from '../../www/src/labs/reconstruct/examples';
 import { fromHash, linkOf, toHash } from '../../www/src/labs/reconstruct/link';
 import type { ParamValues } from '../../www/src/labs/reconstruct/protocol';
+import type { ReconstructContent } from '../../www/src/labs/reconstruct/schema';
 
 const NONE = { added: [], removed: [], outside: [] };
 
@@ -35,7 +35,7 @@ test('parameters that a session does not state are those of the paper', () => {
   const setup = { params: { tau: 0.1, delta: 'auto' }, edits: NONE };
   const entry = { label: 'change', bytes: 1, state: { ...setup, choice: {} } };
   const model = { setup, log: { setup, calls: [{ call: 'setParams', given: { tau: 0.2 } }] } };
-  const content = { model, undo: [entry], redo: [entry] } as unknown as ContentOf<'reconstruct'>;
+  const content = { model, undo: [entry], redo: [entry] } as unknown as ReconstructContent;
   const found = completed(content);
   const expected = { ...PAPER, tau: 0.1, delta: 'auto' };
   const settings = [

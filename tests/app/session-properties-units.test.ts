@@ -7,13 +7,13 @@ import { strFromU8, strToU8, unzipSync, zipSync } from 'three/addons/libs/fflate
 import { assert, expect, test } from 'vitest';
 import { ArchiveTooLarge } from '../../www/src/kit/archive';
 import { History } from '../../www/src/kit/history';
-import { readSession, type Session, writeSession } from '../../www/src/lab/session/file';
+import { writeSession } from '../../www/src/lab/session/file';
 import { unpackMoments } from '../../www/src/lab/session/moments';
-import type { ContentOf } from '../../www/src/lab/session/schema';
 import { lastFrame, poseAt } from '../../www/src/labs/sculpt/film';
 import { unpackTrack } from '../../www/src/labs/track/session';
 import { crossSection } from '../../www/src/scene/cross-section';
 import { anySession } from './made-sessions';
+import { type Contents, readSession, type AnySession as Session } from './read-session';
 
 const RUNS = Number(process.env.PROPERTY_RUNS ?? 100);
 const LIMITS = { timeout: 60_000 + 20 * RUNS };
@@ -88,7 +88,7 @@ const isPoint = (point: unknown) =>
   Array.isArray(point) && point.length === 3 && point.every((x) => Number.isFinite(x) && Math.abs(x) < 1e39);
 
 /** Uses the content of a session as its lab does. */
-const USES: { [Lab in Session['lab']]: (content: ContentOf<Lab>) => void } = {
+const USES: { [Lab in Session['lab']]: (content: Contents[Lab]) => void } = {
   extract: (content) => {
     const { now, undo, redo } = unpackMoments(content);
     for (const { saved, page } of [now, ...[...undo, ...redo].map(({ state }) => state)]) {

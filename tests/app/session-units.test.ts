@@ -4,7 +4,8 @@ import { strFromU8, strToU8, unzipSync, type Zippable, zipSync } from 'three/add
 import { describe, expect, test } from 'vitest';
 import { at } from '../../scripts/shell.mjs';
 import { isSession } from '../../www/src/importers/sessions';
-import { describe as describeFiles, matching, readSession, writeSession } from '../../www/src/lab/session/file';
+import { describe as describeFiles, matching, writeSession } from '../../www/src/lab/session/file';
+import { readSession } from './read-session';
 
 const BYTES = Uint8Array.from({ length: 1000 }, (_, i) => i * i);
 const MOMENT = {

@@ -6,9 +6,10 @@ import { afterAll, beforeAll, expect, test } from 'vitest';
 import init, { Volume } from '../../pkg/index.js';
 import { at } from '../../scripts/shell.mjs';
 import { contentOf } from '../../www/src/lab/session/content';
-import { readSession } from '../../www/src/lab/session/file';
+import type { ExtractContent } from '../../www/src/labs/extract/schema';
 import { type App, afterRun, drop, open, openApp, QUICK, reach, recordStates, unfold } from './browser';
 import { LONG } from './long';
+import { readSession } from './read-session';
 
 let app: App;
 /** A file of the user's: a tooth, of few voxels. */
@@ -137,7 +138,9 @@ test('a session that is being saved is the one before data that are opened meanw
     examples.dispatchEvent(new Event('change'));
   });
   const found = await readSession(await readFile(await (await download).path()));
-  expect(contentOf(found, 'extract').state).toEqual(contentOf(expected, 'extract').state);
+  expect(contentOf<ExtractContent>(found, 'extract').state).toEqual(
+    contentOf<ExtractContent>(expected, 'extract').state,
+  );
   expect([found.hash, found.source]).toEqual([expected.hash, expected.source]);
   await expect.poll(async () => (await states()).join(' ')).toMatch(/\bloading\b.* done$/);
   expect(await page.inputValue('.data select')).toBe('sponge');
@@ -190,9 +193,9 @@ test('a session with its data opens anywhere, and one that cannot be read change
 test('a file of version 1 opens', async () => {
   const { page } = app;
   const bytes = new Uint8Array(await readFile(at('tests/app/data/version-1.vesicle.zip')));
-  const content = contentOf(await readSession(bytes), 'extract');
+  const content = contentOf<ExtractContent>(await readSession(bytes), 'extract');
   await reopened(page, asFile(bytes), 'extract');
-  const now = contentOf(await readSession(await session(page)), 'extract');
+  const now = contentOf<ExtractContent>(await readSession(await session(page)), 'extract');
   // Below the version and checksum, a state has one more number since: the iteration in which the run began.
   expect(now.state?.slice(HEADER)).toEqual(Uint8Array.of(0, ...(content.state ?? []).slice(HEADER)));
   expect(now.undo).toEqual(content.undo);

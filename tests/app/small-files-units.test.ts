@@ -2,7 +2,7 @@
 import { expect, test } from 'vitest';
 import { isOfSmall, SMALL } from '../../www/src/engine/small-files';
 import { checkPlanes, checkSmallImage } from '../../www/src/engine/volumes';
-import type { Session } from '../../www/src/lab/session/schema';
+import type { Session } from '../../www/src/lab/session/check';
 
 type Dims = [number, number, number];
 

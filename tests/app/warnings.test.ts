@@ -4,9 +4,10 @@ import axe, { type Result } from 'axe-core';
 import type { Page } from 'playwright-core';
 import { afterAll, beforeAll, expect, test } from 'vitest';
 import type { Warning } from '../../www/src/engine/warnings';
-import { readSession, writeSession } from '../../www/src/lab/session/file';
+import { writeSession } from '../../www/src/lab/session/file';
 import { type App, drop, open, openApp, QUICK, reach } from './browser';
 import { LONG } from './long';
+import { readSession } from './read-session';
 
 /** None of the examples has a warning, so they come with a session. */
 const WARNINGS: Warning[] = [

@@ -8,6 +8,9 @@ import type { Keeping } from './keeping';
 import type { Kept } from './kept-store';
 import { LABS, labCalled } from './list';
 
+const sessionWorker = (name: string) =>
+  new Worker(new URL('./session-worker.ts', import.meta.url), { type: 'module', name });
+
 /**
  * Opens and closes the labs on the page: one is open at a time. The address of a closed lab, which contains its
  * settings, is kept in its link in the navigation.
@@ -121,7 +124,10 @@ export class Labs {
       preloadWorker(kind.spawn);
       const make = await kind.load();
       if (turn !== this.#turn) return;
-      this.#lab = make({ root: this.#root, help: this.#help, passOn: (passedOn) => this.#passOn(passedOn) });
+      this.#lab = make({
+        ...{ root: this.#root, help: this.#help, sessionWorker },
+        passOn: (passedOn) => this.#passOn(passedOn),
+      });
       this.#keeping.follow(kind.id, this.#lab, kept?.id);
       this.#help.toggleAttribute('disabled', false);
       void this.#lab.start(passedOn ?? (kept && asHandoff(kind, kept)));

@@ -54,6 +54,7 @@ export class ErrorBanner {
 
   hide(): void {
     this.element.hidden = true;
+    this.#title.textContent = '';
     this.#message.textContent = '';
   }
 }

@@ -6,6 +6,8 @@ import { text } from '../texts';
 /** Ids of the labs, as they appear in addresses. */
 export const LAB_IDS = ['extract', 'reconstruct', 'track', 'sculpt', 'segment'] as const;
 
+export type LabId = (typeof LAB_IDS)[number];
+
 /** Returns the id of the lab that the hash of an address names, undefined if none. */
 export const labOf = (hash: string): string | undefined =>
   LAB_IDS.find((id) => hash === `#${id}` || hash.startsWith(`#${id}?`));

@@ -1,8 +1,8 @@
 /** The interface between the page and its labs. */
 import type { ParamValues } from '../engine/protocol';
 import type { Warning } from '../engine/warnings';
-import type { LAB_IDS } from './address';
-import type { Session } from './session/file';
+import type { LabId } from './address';
+import type { Session } from './session/check';
 import type { Work, WorkKind } from './work';
 
 /** A lab as it is, so that it can be brought back. */
@@ -26,7 +26,7 @@ export interface Captured {
  */
 export interface Handoff {
   /** The receiving lab's name in addresses. */
-  lab: (typeof LAB_IDS)[number];
+  lab: LabId;
   /** The session, if it is one; name, bytes and parameters are then empty. */
   session?: Session;
   /** The lab as it was, if it is to be brought back; name, bytes and parameters are then empty. */
@@ -61,17 +61,19 @@ export interface Lab {
 /** Function by which a lab opens another lab with data that it passes on. */
 export type OpenInLab = (passedOn: Handoff) => void;
 
-/** Where a lab is: its element, that of its help, and the way to other labs. */
+/** A lab's place in the app: its element, that of its help, and the way to other labs. */
 export interface LabPlace {
   root: HTMLElement;
   help: HTMLElement;
   passOn: OpenInLab;
+  /** Starts a worker that reads sessions of all labs, with messages in the language `name`. */
+  sessionWorker: (name: string) => Worker;
 }
 
 /** A lab as the page lists it, before its code is loaded. */
 export interface LabKind {
   /** The lab's name in addresses, after the #. */
-  id: (typeof LAB_IDS)[number];
+  id: LabId;
   name: string;
   tagline: string;
   /** Address of the lab's page in the documentation. */

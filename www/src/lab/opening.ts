@@ -5,7 +5,7 @@ import type { ErrorBanner, StatusLine } from '../kit/status';
 import { text } from '../texts';
 import type { Handoff } from './lab';
 import { LinkError, readLink } from './link-query';
-import type { Session } from './session/file';
+import type { Session } from './session/check';
 import type { LabStates } from './states';
 
 /** Milliseconds that a busy worker has to save its model before it is terminated. */

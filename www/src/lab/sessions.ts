@@ -7,17 +7,18 @@ import { ENDING, isNamedSession, isSession } from '../importers/sessions';
 import type { ErrorBanner, StatusLine } from '../kit/status';
 import type { WarningList } from '../kit/warnings';
 import { text } from '../texts';
-import type { LAB_IDS } from './address';
+import type { LabId } from './address';
 import type { Captured, Handoff, OpenInLab } from './lab';
 import type { AnyOpening, Source } from './opening';
 import type { Saving } from './saving';
-import type { NewSession, Session, SourceFile } from './session/file';
+import type { Session } from './session/check';
+import type { NewSession, SourceFile } from './session/file';
 import type { LabStates } from './states';
 import type { Work, WorkKind } from './work';
 
 /** A lab, as its sessions need it. */
 interface SessionLab<Example> {
-  id: (typeof LAB_IDS)[number];
+  id: LabId;
   page: { banner: ErrorBanner; status: StatusLine; saving: Saving; warnings: WarningList };
   /** The controls of its run, if it has one. */
   run?: { readonly finish: Finish | undefined };
@@ -25,6 +26,8 @@ interface SessionLab<Example> {
   work: Work;
   opening: AnyOpening<Example>;
   passOn: OpenInLab;
+  /** Starts a worker that reads sessions. */
+  sessionWorker: (name: string) => Worker;
   address: (source: OpenSource<Example>) => string;
   content: () => Promise<Record<string, unknown> | undefined>;
   /** Called when a session was saved. */
@@ -192,7 +195,7 @@ export class Sessions<Example extends { id: string }> {
 
   async #readFile(file: File): Promise<Session> {
     const { readApart } = await import('./session/apart');
-    return readApart(new Uint8Array(await file.arrayBuffer()));
+    return readApart(new Uint8Array(await file.arrayBuffer()), this.#lab.sessionWorker);
   }
 
   /** Opens a session, or asks for its data if it has none. */

@@ -60,16 +60,18 @@ export class LabShell<Example extends Listed> implements Lab {
   onShowKept: () => void = () => undefined;
   readonly root: HTMLElement;
   readonly passOn: OpenInLab;
+  readonly #sessionWorker: LabPlace['sessionWorker'];
   /** Aborted when the lab is closed, which removes all event listeners. */
   readonly #closing = new AbortController();
   readonly #help: HTMLElement;
   readonly #lab: ShelledLab<Example>;
   #sessions: Sessions<Example> | undefined;
 
-  constructor({ root, help, passOn }: LabPlace, lab: ShelledLab<Example>) {
+  constructor({ root, help, passOn, sessionWorker }: LabPlace, lab: ShelledLab<Example>) {
     this.root = root;
     this.#help = help;
     this.passOn = passOn;
+    this.#sessionWorker = sessionWorker;
     this.#lab = lab;
   }
 
@@ -83,6 +85,7 @@ export class LabShell<Example extends Listed> implements Lab {
     const { id, ui, states, opening } = this.#lab;
     this.#sessions = new Sessions({
       ...{ id, states, opening, work: this.work, passOn: this.passOn, page: ui.page },
+      sessionWorker: this.#sessionWorker,
       ...(ui.run && { run: ui.run }),
       address: (source) => this.#lab.address(source),
       content: () => this.#lab.sessionContent(),

@@ -1,12 +1,14 @@
 /** Reads sessions in a worker of their own, so that the page answers meanwhile. */
 import { LANGUAGE } from '../../texts';
+import type { Session } from './check';
 import type { Reply } from './protocol';
-import type { Session } from './schema';
 
-/** Does what `readSession` does, in a worker; `bytes` are transferred to it. */
-export async function readApart(bytes: Uint8Array): Promise<Session> {
-  // Its name is the language of its messages.
-  const worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module', name: LANGUAGE });
+/**
+ * Does what `readSession` does, in a worker that `spawn` starts; `bytes` are transferred to it. Its name is the language of its
+ * messages.
+ */
+export async function readApart(bytes: Uint8Array, spawn: (name: string) => Worker): Promise<Session> {
+  const worker = spawn(LANGUAGE);
   try {
     const reply = await new Promise<Exclude<Reply, 'ready'>>((resolve, reject) => {
       worker.onmessage = ({ data }: MessageEvent<Reply>) => {

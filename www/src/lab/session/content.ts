@@ -1,8 +1,9 @@
 import { text } from '../../texts';
-import type { ContentOf, Session } from './schema';
+import type { LabId } from '../address';
+import type { Session } from './check';
 
 /** Returns the content of a session that is opened in the lab `lab`, which is that of the session. */
-export function contentOf<Lab extends Session['lab']>(session: Session, lab: Lab): ContentOf<Lab> {
+export function contentOf<Content extends Session['content']>(session: Session, lab: LabId): Content {
   if (session.lab !== lab) throw new Error(text('sessions.otherLab', { lab: session.lab }));
-  return session.content as unknown as ContentOf<Lab>;
+  return session.content as Content;
 }

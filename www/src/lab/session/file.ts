@@ -8,8 +8,8 @@ import { SMALL } from '../../engine/small-files';
 import { INDEX } from '../../importers/sessions';
 import { ArchiveTooLarge, MOST_FILES, unpack } from '../../kit/archive';
 import { text } from '../../texts';
+import { checked, type Session, type SessionSchema, shown } from './check';
 import { decode, encode, type Parts } from './codec';
-import { checked, type Session, shown } from './schema';
 import { zipped } from './zip';
 
 const FORMAT = 'vesicle-session';
@@ -23,8 +23,6 @@ const MOST_INDEX = 2 ** 27;
 const MOST_VALUES = 5e6;
 /** Largest size of the `session.json` in a small file. */
 const MOST_INDEX_OF_SMALL = 2 ** 23;
-
-export type { Session };
 
 /** Description of a file of the data that a session was made with; `content` if the session includes it. */
 export interface SourceFile {
@@ -95,8 +93,15 @@ const mostIndex = (file: Uint8Array) => (file.length <= SMALL ? MOST_INDEX_OF_SM
 /** Unpacks an archive; see {@link unpack}. */
 type Unpack = (archive: Uint8Array, mostBytes: number, refusal: string) => Parts;
 
-/** Reads a session, which `unpacking` unpacks. Throws an Error whose message says what is wrong with the file. */
-export async function readSession(bytes: Uint8Array, unpacking: Unpack = unpack): Promise<Session> {
+/**
+ * Reads a session of one of the labs in `schemas`, which `unpacking` unpacks. Throws an Error whose message says what is wrong
+ * with the file.
+ */
+export async function readSession(
+  bytes: Uint8Array,
+  schemas: ReadonlyMap<unknown, SessionSchema>,
+  unpacking: Unpack = unpack,
+): Promise<Session> {
   const { [INDEX]: packed, ...parts } = partsOf(bytes, unpacking);
   if (!packed) throw new Error(text('sessions.noIndex'));
   requireSize(packed, mostIndex(bytes));
@@ -112,7 +117,7 @@ export async function readSession(bytes: Uint8Array, unpacking: Unpack = unpack)
     found.add(name);
     return part;
   };
-  return checked(decoded(body, find));
+  return checked(decoded(body, find), schemas);
 }
 
 /** Throws an Error if a `session.json` is too large. */

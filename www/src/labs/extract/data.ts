@@ -7,9 +7,8 @@ import { dataUrl, fetchBytes, preload } from '../../lab/downloads';
 import type { Handoff } from '../../lab/lab';
 import { LinkError, readLink } from '../../lab/link-query';
 import type { LabData, Loading, Opening, Source } from '../../lab/opening';
+import type { Session } from '../../lab/session/check';
 import { contentOf } from '../../lab/session/content';
-import type { Session } from '../../lab/session/file';
-import type { ContentOf } from '../../lab/session/schema';
 import type { LabStates } from '../../lab/states';
 import { text } from '../../texts';
 import type { ExtractClient } from './client';
@@ -20,6 +19,7 @@ import type { ExtractParts } from './parts';
 import { defaultStart, exampleById } from './presets';
 import type { ImageSource, Loaded, Setup } from './protocol';
 import type { ExtractResults } from './results';
+import type { ExtractContent } from './schema';
 import type { ExtractMoments, ExtractSettings } from './settings';
 
 export type ExtractSource = Source<Example, Linked, ImageSource>;
@@ -132,7 +132,8 @@ export class ExtractData implements LabData<Example, Linked, ImageSource, Opened
     this.#ui.adopt(volume, source, labels);
     if (source.linked?.color) this.#ui.options.set({ color: source.linked.color });
     this.#settings.adopt(volume, choice, params, setup);
-    if (moments) return this.#resume(moments, source.session && contentOf(source.session, 'extract').view);
+    if (moments)
+      return this.#resume(moments, source.session && contentOf<ExtractContent>(source.session, 'extract').view);
     this.#settings.checkpoint(text('labs.play'));
     await this.#client.request('play', undefined);
   }
@@ -156,7 +157,7 @@ export class ExtractData implements LabData<Example, Linked, ImageSource, Opened
   }
 
   /** Continues a session: shows its state and view, and does not run it. */
-  #resume(moments: ExtractMoments, view: ContentOf<'extract'>['view']): void {
+  #resume(moments: ExtractMoments, view: ExtractContent['view']): void {
     this.#settings.resume(moments);
     if (!view) return;
     this.#ui.options.set(view.options);
@@ -244,7 +245,7 @@ export function fetchLinked(): void {
 
 async function momentsOf(session: Session): Promise<ExtractMoments> {
   const { unpackMoments } = await import('../../lab/session/moments');
-  return unpackMoments(contentOf(session, 'extract'));
+  return unpackMoments(contentOf<ExtractContent>(session, 'extract'));
 }
 
 /** Returns the frame of a 4D volume that a source opens, counted from 0: that of its link or session. */

@@ -1,6 +1,5 @@
 import type { LabData, Loading, Opening, Source } from '../../lab/opening';
 import { contentOf } from '../../lab/session/content';
-import type { ContentOf } from '../../lab/session/schema';
 import { text } from '../../texts';
 import { completed } from './before';
 import type { ReconstructClient } from './client';
@@ -12,6 +11,7 @@ import { NO_EDITS } from './picking';
 import { type PointFiles as Data, fromExample, fromFiles } from './point-files';
 import { type CloudVariant, cloudById, isCloudPreset } from './presets';
 import type { Cloud, CloudSource, NamedBytes, ParamSpec, ParamValues, SavedSurface, Setup } from './protocol';
+import type { ReconstructContent } from './schema';
 import type { ReconstructSettings } from './settings';
 
 export type CloudOrigin = Source<CloudExample, LinkedCloud, Data>;
@@ -75,7 +75,7 @@ export class ReconstructData implements LabData<CloudExample, LinkedCloud, Data,
     { present }: Loading<CloudExample, LinkedCloud, Data>,
   ): Promise<OpenedCloud> {
     const from = source ?? (await pointsOf(present));
-    const saved = origin.session && savedIn(completed(contentOf(origin.session, 'reconstruct')));
+    const saved = origin.session && savedIn(completed(contentOf<ReconstructContent>(origin.session, 'reconstruct')));
     const setup = saved?.setup ?? this.#setupFor(origin, source === undefined, present);
     const cameras = photographs.map(({ view }) => view);
     const loaded = await this.#client.request('load', { source: from, cameras, setup, saved });
@@ -145,7 +145,7 @@ async function pointsOf(present: CloudOrigin | undefined): Promise<CloudSource> 
   return source;
 }
 
-const savedIn = ({ state, model }: ContentOf<'reconstruct'>): SavedSurface => ({ ...model, state });
+const savedIn = ({ state, model }: ReconstructContent): SavedSurface => ({ ...model, state });
 
 function firstVariant(example: CloudExample): CloudVariant | undefined {
   return isCloudPreset(example) ? example.variants[0] : undefined;

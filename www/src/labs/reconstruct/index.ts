@@ -4,7 +4,6 @@ import type { Lab, LabPlace } from '../../lab/lab';
 import { Opening } from '../../lab/opening';
 import { type RunningLab, Runs } from '../../lab/runs';
 import { contentOf } from '../../lab/session/content';
-import type { ContentOf } from '../../lab/session/schema';
 import { LabShell } from '../../lab/shell';
 import { LabStates } from '../../lab/states';
 import { text } from '../../texts';
@@ -18,6 +17,7 @@ import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } fr
 import type { ParamValues, PointQuantity, WorkerEvent } from './protocol';
 import { ReconstructResults } from './results';
 import type { CloudViewOptions } from './scene';
+import type { ReconstructContent } from './schema';
 import { ReconstructSettings } from './settings';
 
 /**
@@ -106,12 +106,12 @@ class ReconstructLab implements RunningLab<CloudExample> {
     this.ui.options.set({ color, points: true, constraints: false, ...(isCloudPreset(example) && example.view) });
     this.ui.photos.choose(photoFor(example, linked?.photo));
     this.#settings.showParams(params);
-    if (session) return this.#resume(completed(contentOf(session, 'reconstruct')));
+    if (session) return this.#resume(completed(contentOf<ReconstructContent>(session, 'reconstruct')));
     await this.client.request('play', undefined);
   }
 
   /** Continues a session, whose model has been restored: shows its state and view, and does not run it. */
-  async #resume({ undo, redo, reports, view }: ContentOf<'reconstruct'>): Promise<void> {
+  async #resume({ undo, redo, reports, view }: ReconstructContent): Promise<void> {
     this.#settings.entries = { undo, redo };
     const [list = []] = reports;
     this.#history.rewind({ reports: list, iteration: Number.POSITIVE_INFINITY });

@@ -9,6 +9,7 @@ import { fromHash, type LinkedScene } from './link';
 import { fromExample, fromFiles } from './mesh-files';
 import { poseOf, sceneById } from './presets';
 import type { NamedBytes, OpenedScene, SceneSource, Support } from './protocol';
+import type { SculptContent } from './schema';
 import type { SculptMoments } from './settings';
 
 export type SculptSource = Source<SculptExample, LinkedScene, SceneSource>;
@@ -74,7 +75,7 @@ export class SculptData implements LabData<SculptExample, LinkedScene, SceneSour
   async load({ name, example, linked, session }: SculptSource, meshes: SceneSource): Promise<OpenedPose> {
     if (session) {
       const { unpackMoments } = await import('../../lab/session/moments');
-      const content = contentOf(session, 'sculpt');
+      const content = contentOf<SculptContent>(session, 'sculpt');
       const moments: SculptMoments = unpackMoments(content);
       const { saved } = moments.now;
       const { log } = content;

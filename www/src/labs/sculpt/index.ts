@@ -6,7 +6,6 @@ import { LinkError, readLink } from '../../lab/link-query';
 import { Opening } from '../../lab/opening';
 import { type RunningLab, Runs } from '../../lab/runs';
 import { contentOf } from '../../lab/session/content';
-import type { ContentOf } from '../../lab/session/schema';
 import { LabShell } from '../../lab/shell';
 import { LabStates } from '../../lab/states';
 import { text } from '../../texts';
@@ -23,6 +22,7 @@ import { isSculptPreset, poseOf, type SculptPreset, type SculptVariant, variantI
 import type { FrameContents, FrameEvent, ParamValues, SculptQuantity, Support, WorkerEvent } from './protocol';
 import { SculptResults } from './results';
 import type { SculptViewOptions } from './scene';
+import type { SculptContent } from './schema';
 import { type SculptMoments, SculptSettings } from './settings';
 
 /** The colourings of the surface for which the worker has to compute values at the vertices. */
@@ -153,7 +153,8 @@ class SculptLab implements RunningLab<SculptExample> {
       ...preset?.view,
     });
     if (preset?.stages) this.#results.showStages(preset.stages);
-    if (opened.moments) return this.#resume(opened.moments, session && contentOf(session, 'sculpt').view);
+    if (opened.moments)
+      return this.#resume(opened.moments, session && contentOf<SculptContent>(session, 'sculpt').view);
     await this.#settings.setFilm(film, 0);
     await this.client.request('show', this.#shown);
     const endless = film?.loop === true && prefersReducedMotion();
@@ -161,7 +162,7 @@ class SculptLab implements RunningLab<SculptExample> {
   }
 
   /** Continues a session: shows its state and view, and does not run it. */
-  async #resume(moments: SculptMoments, view: ContentOf<'sculpt'>['view']): Promise<void> {
+  async #resume(moments: SculptMoments, view: SculptContent['view']): Promise<void> {
     if (view) this.ui.options.set(view.options);
     await this.client.request('show', this.#shown);
     await this.#settings.resume(moments);

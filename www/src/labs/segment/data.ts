@@ -9,6 +9,7 @@ import type { SegmentClient } from './client';
 import { SEGMENT_EXAMPLES, type SegmentExample, segmentExampleById } from './examples';
 import { fromHash, type LinkedSegment } from './link';
 import type { ImageSource, NamedBytes, OpenedImage, ParamSpec } from './protocol';
+import type { SegmentContent } from './schema';
 
 export type SegmentSource = Source<SegmentExample, LinkedSegment, ImageSource>;
 export type SegmentOpening = Opening<SegmentExample, LinkedSegment, ImageSource, OpenedImage>;
@@ -73,7 +74,7 @@ export class SegmentData implements LabData<SegmentExample, LinkedSegment, Image
   ): Promise<OpenedImage> {
     const { name, linked, session } = origin;
     if (session && !reopening) {
-      const { params, voxels: labels, state, labels: list } = contentOf(session, 'segment');
+      const { params, voxels: labels, state, labels: list } = contentOf<SegmentContent>(session, 'segment');
       const isSmall = session.isSmall === true;
       const refusal = isSmall && tooManyLabels(list.length);
       if (refusal) throw new Error(refusal);

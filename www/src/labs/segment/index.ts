@@ -8,7 +8,6 @@ import type { LabState } from '../../kit/state';
 import type { Lab, LabPlace } from '../../lab/lab';
 import { Opening } from '../../lab/opening';
 import { contentOf } from '../../lab/session/content';
-import type { ContentOf } from '../../lab/session/schema';
 import { LabShell, type ShelledLab } from '../../lab/shell';
 import { LabStates } from '../../lab/states';
 import { spaceOf, unitOf } from '../../lab/surface-space';
@@ -25,6 +24,7 @@ import { type Tool, type ToolSettings, usesRange } from './panels/tools';
 import { type PartEvents, SegmentParts, type SurfaceFormat } from './parts';
 import type { OpenedImage, OpenedLabels, ParamValues, SurfaceUpdate, VolumeView, WorkerEvent } from './protocol';
 import { saveMap, saveSurfaces } from './saving';
+import type { SegmentContent } from './schema';
 
 /** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
 const MASK_DELAY = 120;
@@ -198,7 +198,7 @@ class SegmentLab implements ShelledLab<SegmentExample> {
     this.#forgetMask();
     this.ui.view.setVolume(volume, { dims: volume.dims, voxels, ...NO_OVERLAYS });
     if (reopening) this.#editing.readopt(volume, opened);
-    else if (session) this.#resume(opened, contentOf(session, 'segment'));
+    else if (session) this.#resume(opened, contentOf<SegmentContent>(session, 'segment'));
     else {
       this.#editing.adopt(volume, opened, example?.labels ?? []);
       this.ui.tools.set({ range: example?.range ?? [...volume.window] });
@@ -210,7 +210,7 @@ class SegmentLab implements ShelledLab<SegmentExample> {
   }
 
   /** Continues a session: its list of labels, tools and view. */
-  #resume(opened: OpenedImage, { tools, view, ...list }: ContentOf<'segment'>): void {
+  #resume(opened: OpenedImage, { tools, view, ...list }: SegmentContent): void {
     this.#editing.resume(opened.volume, opened, list);
     if (tools) this.ui.tools.set(tools);
     this.ui.page.data.setFact(MAP_FACT, text('segment.sessionMap'));

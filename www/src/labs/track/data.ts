@@ -9,6 +9,7 @@ import { IMAGES, type TrackExample } from './examples';
 import { fromHash, type LinkedTrack, setupOf } from './link';
 import { imageById } from './presets';
 import type { ImageSource, NamedBytes, OpenedImage as OpenedFilm, Setup } from './protocol';
+import type { TrackContent } from './schema';
 import type { TrackMoment } from './settings';
 
 export type TrackSource = Source<TrackExample, LinkedTrack, ImageSource>;
@@ -76,7 +77,7 @@ export class TrackData implements LabData<TrackExample, LinkedTrack, ImageSource
     source: ImageSource,
     { reopening }: Loading<TrackExample, LinkedTrack, ImageSource>,
   ): Promise<OpenedTrack> {
-    const moments = session && (await import('./session')).unpackTrack(contentOf(session, 'track'));
+    const moments = session && (await import('./session')).unpackTrack(contentOf<TrackContent>(session, 'track'));
     const saved = moments?.now.saved;
     const setup = saved?.setup ?? (reopening ? this.#present() : setupOf(example, linked));
     const isSmall = isOfSmall(session, 'files' in source ? source.files : undefined);

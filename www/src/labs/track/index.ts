@@ -8,7 +8,6 @@ import { Opening } from '../../lab/opening';
 import { type RunningLab, Runs } from '../../lab/runs';
 import { contentOf } from '../../lab/session/content';
 import type { Moments } from '../../lab/session/moments';
-import type { ContentOf } from '../../lab/session/schema';
 import { LabShell } from '../../lab/shell';
 import { LabStates } from '../../lab/states';
 import { unitOf } from '../../lab/surface-space';
@@ -26,6 +25,7 @@ import { isTrackPreset, type TrackPreset, type TrackVariant, variantInForce, vie
 import type { Alternative, StepEvent, Vec3, VolumeView, WorkerEvent } from './protocol';
 import { TrackResults } from './results';
 import { saveTrack } from './saving';
+import type { TrackContent } from './schema';
 import { type TrackMoment, TrackSettings } from './settings';
 
 /**
@@ -146,7 +146,7 @@ class TrackLab implements RunningLab<TrackExample> {
     this.#takeVolume(opened.volume, false);
     this.#settings.adopt(setup, { ...opened, volume: undefined });
     this.#results.startOver();
-    if (moments) return this.#resume(moments, session && contentOf(session, 'track').view);
+    if (moments) return this.#resume(moments, session && contentOf<TrackContent>(session, 'track').view);
     this.ui.options.set({ ...viewOf(example), ...linked?.view });
     if (setup.box && this.#region) this.ui.view.fitRegion(this.#region);
     const crosshair = (setup.at === example?.at && example?.crosshair) || setup.at;
@@ -200,7 +200,7 @@ class TrackLab implements RunningLab<TrackExample> {
   }
 
   /** Continues a session: shows its state and view, and does not run it. */
-  async #resume(moments: Moments<TrackMoment>, view: ContentOf<'track'>['view']): Promise<void> {
+  async #resume(moments: Moments<TrackMoment>, view: TrackContent['view']): Promise<void> {
     await this.#settings.resume(moments);
     if (this.#isUntouched) this.#asking.begin();
     const state = moments.now.saved.done ? 'done' : 'paused';

@@ -1,7 +1,7 @@
 /** The Track lab's own part of a session. */
 import { type Moments, mapMoments, packMoments, unpackMoments } from '../../lab/session/moments';
-import type { ContentOf } from '../../lab/session/schema';
 import type { TrackedFrame } from './protocol';
+import type { TrackContent } from './schema';
 import type { TrackMoment } from './settings';
 
 /** Returns saved states as plain data, in which all share one list of tracked frames. */
@@ -19,7 +19,7 @@ export function packTrack(moments: Moments<TrackMoment>): Record<string, unknown
 }
 
 /** Returns the saved states in the content of a session. */
-export function unpackTrack({ frames: all, ...content }: ContentOf<'track'>): Moments<TrackMoment> {
+export function unpackTrack({ frames: all, ...content }: TrackContent): Moments<TrackMoment> {
   return mapMoments(unpackMoments(content), ({ saved, page: { frames, ...page } }) => ({
     saved,
     page: { record: { ...page, frames: frames.flatMap((index) => all[index] ?? []) } },

@@ -1,9 +1,44 @@
-/** Sessions of the Track lab. */
+/** The schema of sessions of the Track lab. */
 
-import { check, custom, literal, object, optional, picklist, pipe, strictTuple, variant } from 'valibot';
-import type { Surface } from '../../../engine/protocol';
-import { call, camera, history, log, placement, reports, session, steps, undoable } from './parts';
-import { anyNumber, between, bytes, count, flag, list, maybe, oneOf, params, real, vec3 } from './values';
+import {
+  check,
+  custom,
+  type InferOutput,
+  literal,
+  object,
+  optional,
+  picklist,
+  pipe,
+  strictTuple,
+  variant,
+} from 'valibot';
+import type { Surface } from '../../engine/protocol';
+import type { ContentOf } from '../../lab/session/check';
+import {
+  call,
+  camera,
+  history,
+  log,
+  markMismatch,
+  placement,
+  reports,
+  session,
+  steps,
+  undoable,
+} from '../../lab/session/parts';
+import {
+  anyNumber,
+  between,
+  bytes,
+  count,
+  flag,
+  list,
+  maybe,
+  oneOf,
+  params,
+  real,
+  vec3,
+} from '../../lab/session/values';
 
 const enrichment = oneOf({ none: true, linear: true, flow: true });
 const setup = object({
@@ -62,8 +97,15 @@ const view = object({
   options: object({ surface: flag, edges: flag, votes, region: flag, slices: placement, below }),
 });
 
-export const track = object({
+/** The lab's own part of a session: its model, history, undo and view. */
+export type TrackContent = ContentOf<typeof schema>;
+
+export const schema = object({
   ...{ lab: literal('track'), ...session },
   ...{ ...moment, undo: undoable(moment), redo: undoable(moment), reports, view: optional(view) },
   frames: list(frame, 10_000),
 });
+
+/** Returns the path of the first field of a session that refers to something that it does not have. */
+export const mismatchOf = (session: InferOutput<typeof schema>): string | undefined =>
+  markMismatch(session, session.frames.length);

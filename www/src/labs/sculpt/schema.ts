@@ -1,8 +1,20 @@
-/** Sessions of the Sculpt lab. */
-import { literal, minLength, object, optional, pipe, strictTuple, union, variant } from 'valibot';
-import { call, camera, history, log, reports, session, steps, undoable } from './parts';
-import { color } from './reconstruct';
-import { between, bytes, count, flag, list, maybe, name, oneOf, params, text, vec3 } from './values';
+/** The schema of sessions of the Sculpt lab. */
+
+import { type InferOutput, literal, minLength, object, optional, pipe, strictTuple, union, variant } from 'valibot';
+import type { ContentOf } from '../../lab/session/check';
+import {
+  call,
+  camera,
+  color,
+  history,
+  log,
+  markMismatch,
+  reports,
+  session,
+  steps,
+  undoable,
+} from '../../lab/session/parts';
+import { between, bytes, count, flag, list, maybe, name, oneOf, params, text, vec3 } from '../../lab/session/values';
 
 const pose = list(object({ center: vec3, axes: strictTuple([vec3, vec3, vec3]) }), 1000);
 const keys = pipe(list(pose, 1000), minLength(1));
@@ -20,8 +32,14 @@ const moment = {
 const layout = oneOf({ result: true, base: true, pair: true, row: true, levels: true, stages: true });
 const view = object({ camera, options: object({ layout, edges: flag, ellipsoids: flag, color }) });
 
-export const sculpt = object({
+/** The lab's own part of a session: its model, history, undo and view. */
+export type SculptContent = ContentOf<typeof schema>;
+
+export const schema = object({
   ...{ lab: literal('sculpt'), ...session },
   ...{ ...moment, undo: undoable(moment), redo: undoable(moment), reports, view: optional(view) },
   ...{ params: optional(params, () => ({})), log: optional(log(object({ start: pose, params, support }), calls)) },
 });
+
+/** Returns the path of the first field of a session that refers to something that it does not have. */
+export const mismatchOf = (session: InferOutput<typeof schema>): string | undefined => markMismatch(session);

@@ -14,8 +14,9 @@ import {
   unknown,
   variant,
 } from 'valibot';
-import type { Warning } from '../../../engine/warnings';
-import type { SlicePlacement } from '../../../kit/view-options';
+import type { Warning } from '../../engine/warnings';
+import type { SlicePlacement } from '../../kit/view-options';
+import type { SurfaceColor } from '../../scene/surface';
 import { anyNumber, between, bytes, count, flag, list, name, named, oneOf, real, text, vec3 } from './values';
 
 const warning = object({
@@ -98,3 +99,35 @@ export const history = object({ list: count, iteration: count });
 
 export const camera = object({ position: vec3, target: vec3 });
 export const placement = oneOf<SlicePlacement>({ walls: true, 'in place': true, hidden: true });
+/** Colourings that surfaces may have. */
+export const color = oneOf<SurfaceColor>({
+  ...{ plain: true, component: true, own: true, texture: true, speed: true, distance: true, deviation: true },
+  ...{ 'mean curvature': true, 'gaussian curvature': true, 'area distortion': true, 'angle distortion': true },
+});
+
+interface Page {
+  history: { list: number };
+  frames?: number[];
+}
+
+interface WithMarks {
+  page: Page;
+  undo: { page: Page }[];
+  redo: { page: Page }[];
+  reports: unknown[];
+}
+
+/** Returns the path of the first saved state of a session that refers to a list of reports, or a frame, which it does not have. */
+export function markMismatch(
+  { page, undo, redo, reports }: WithMarks,
+  frames = Number.POSITIVE_INFINITY,
+): string | undefined {
+  const pages: [string, Page][] = [['page', page]];
+  for (const [list, states] of Object.entries({ undo, redo }))
+    for (const [index, state] of states.entries()) pages.push([`${list}[${index}].page`, state.page]);
+  for (const [path, { history, frames: used = [] }] of pages) {
+    if (history.list >= reports.length) return `${path}.history.list`;
+    if (used.some((frame) => frame >= frames)) return `${path}.frames`;
+  }
+  return undefined;
+}

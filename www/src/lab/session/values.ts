@@ -21,7 +21,7 @@ import {
   union,
   unknown,
 } from 'valibot';
-import { shortName } from '../../../engine/labels';
+import { shortName } from '../../engine/labels';
 
 /** Most characters of a text that is shown as it is. */
 const MOST_TEXT = 10_000;

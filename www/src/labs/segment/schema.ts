@@ -1,4 +1,5 @@
-/** Sessions of the Segment lab. */
+/** The schema of sessions of the Segment lab. */
+
 import {
   check,
   custom,
@@ -15,9 +16,10 @@ import {
   strictTuple,
   string,
 } from 'valibot';
-import { type LabelArray, rangeOf } from '../../../engine/labels';
-import { camera, placement, session } from './parts';
-import { bytes, flag, list, name, oneOf, params, real, vec3 } from './values';
+import { type LabelArray, rangeOf } from '../../engine/labels';
+import type { ContentOf } from '../../lab/session/check';
+import { camera, placement, session } from '../../lab/session/parts';
+import { bytes, flag, list, name, oneOf, params, real, vec3 } from '../../lab/session/values';
 
 const voxels = custom<LabelArray>(
   (value) => ArrayBuffer.isView(value) && 'BYTES_PER_ELEMENT' in value && !/Float|Big/.test(value.constructor.name),
@@ -42,14 +44,17 @@ const view = object({
 /** Files may have 4000, and a few may be added. */
 const most = 4500;
 
-export const segment = object({
+/** The lab's own part of a session: its model, history, undo and view. */
+export type SegmentContent = ContentOf<typeof schema>;
+
+export const schema = object({
   ...{ lab: literal('segment'), ...session },
   ...{ voxels, state: bytes, labels: list(label, most), active: value, hidden: list(value, most), params },
   ...{ tools: optional(tools), view: optional(view) },
 });
 
 /** Returns the path of the first field of a session that does not fit the labels and the label map. */
-export function mismatchOf({ voxels, labels, active, hidden }: InferOutput<typeof segment>): string | undefined {
+export function mismatchOf({ voxels, labels, active, hidden }: InferOutput<typeof schema>): string | undefined {
   const [low, high] = rangeOf(voxels);
   const values = new Set(labels.map((label) => label.value));
   const wrong = [...values].some((value) => value === 0 || value < low || value > high);

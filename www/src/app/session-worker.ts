@@ -1,10 +1,11 @@
 /** Worker that reads a session, so that the page answers meanwhile. */
-import { readSession } from './file';
-import type { Reply } from './protocol';
+import { readSession } from '../lab/session/file';
+import type { Reply } from '../lab/session/protocol';
+import { SCHEMAS } from './session-schemas';
 
 self.onmessage = async ({ data }: MessageEvent<Uint8Array>) => {
   try {
-    const session = await readSession(data);
+    const session = await readSession(data, SCHEMAS);
     self.postMessage({ session } satisfies Reply, { transfer: [...buffersIn(session)] });
   } catch (error) {
     const message = error instanceof Error ? error.message : String(error);

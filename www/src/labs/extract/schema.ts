@@ -1,10 +1,22 @@
-/** Sessions of the Extract lab. */
-import { literal, object, optional, picklist, undefined_, variant } from 'valibot';
+/** The schema of sessions of the Extract lab. */
 
-import type { ColorMode } from '../../../kit/view-options';
-import { MOST_ATTRACTORS } from '../../attractors';
-import { call, camera, history, log, placement, reports, session, steps, undoable } from './parts';
-import { bytes, count, flag, list, maybe, oneOf, params, real, vec3 } from './values';
+import { type InferOutput, literal, object, optional, picklist, undefined_, variant } from 'valibot';
+import type { ColorMode } from '../../kit/view-options';
+import { MOST_ATTRACTORS } from '../../lab/attractors';
+import type { ContentOf } from '../../lab/session/check';
+import {
+  call,
+  camera,
+  history,
+  log,
+  markMismatch,
+  placement,
+  reports,
+  session,
+  steps,
+  undoable,
+} from '../../lab/session/parts';
+import { bytes, count, flag, list, maybe, oneOf, params, real, vec3 } from '../../lab/session/values';
 
 const start = variant('kind', [
   object({ kind: picklist(['contour', 'enclosing', 'isosurface']) }),
@@ -45,7 +57,13 @@ const view = object({
   options: object({ surface: flag, edges: flag, color, slices: placement }),
 });
 
-export const extract = object({
+/** The lab's own part of a session: its model, history, undo and view. */
+export type ExtractContent = ContentOf<typeof schema>;
+
+export const schema = object({
   ...{ lab: literal('extract'), ...session },
   ...{ ...moment, undo: undoable(moment), redo: undoable(moment), reports, view: optional(view) },
 });
+
+/** Returns the path of the first field of a session that refers to something that it does not have. */
+export const mismatchOf = (session: InferOutput<typeof schema>): string | undefined => markMismatch(session);
