@@ -101,7 +101,9 @@ test(
     await page.keyboard.press('r');
     await reach(page, 'paused');
     await page.keyboard.press('s');
-    await page.waitForFunction(() => document.querySelector('[data-state=paused]'));
+    await expect.poll(() => iteration(page)).toBe(1);
+    // The report of the mesh comes after its measures.
+    await expect.poll(async () => 'closed' in (await measures(page))).toBe(true);
     const before = [await iteration(page), await measures(page)];
     await page.click('#labs [data-lab=sculpt]');
     await page.waitForSelector('#labs [data-lab=sculpt][aria-current=page]');
