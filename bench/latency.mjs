@@ -17,7 +17,7 @@ const middle = (values) => values.toSorted((a, b) => a - b)[values.length >> 1];
  * slice, and what is painted on it.
  */
 function watchMessages() {
-  const messages = { requests: 0, answers: 0, bytes: 0 };
+  const messages = { requests: 0, answers: 0 };
   Object.assign(window, { messages, drawn: 0 });
   const { postMessage } = Worker.prototype;
   const known = new WeakSet();
@@ -61,7 +61,7 @@ async function steps(browser, address) {
 /** Runs in the page: clicks *Step*, and waits until the surface is drawn. */
 async function stepInPage() {
   const { watched, messages } = window;
-  const button = [...document.querySelectorAll('.transport button')].find((one) => one.title === 'Step');
+  const button = [...document.querySelectorAll('.transport button')].find((one) => one.textContent.trim() === 'Step');
   const before = { ...watched.uploads, copied: watched.copied, ...messages };
   const began = performance.now();
   button.click();
@@ -78,7 +78,7 @@ async function stepInPage() {
   };
 }
 
-/** Returns the way of strokes: milliseconds to the slice and to the surfaces, and draws of slices for each movement. */
+/** Returns the way of strokes: milliseconds of a frame with a movement, and to the surfaces, and draws of slices for each movement. */
 async function strokes(browser, address) {
   const page = await open(browser, `${address}#segment`);
   await page.waitForSelector('[data-state=done]');
@@ -92,7 +92,7 @@ async function strokes(browser, address) {
   }
   await page.close();
   const one = (name) => middle(all.map((stroke) => stroke[name]));
-  return Object.fromEntries(['slice', 'draws', 'surfaces', 'requests'].map((name) => [name, one(name)]));
+  return Object.fromEntries(['frame', 'draws', 'surfaces', 'requests'].map((name) => [name, one(name)]));
 }
 
 /** Runs in the page: draws a stroke, a movement for each animation frame. */
@@ -118,10 +118,10 @@ async function strokeInPage([x, y, moves]) {
   const requests = messages.requests;
   fire('pointerdown', x);
   for (let k = 1; k <= moves; k++) {
-    await frame();
-    const before = window.drawn;
     const began = performance.now();
+    const before = window.drawn;
     fire('pointermove', x + 2 * k);
+    await frame();
     while (window.drawn === before) await frame();
     times.push(performance.now() - began);
   }
@@ -132,7 +132,7 @@ async function strokeInPage([x, y, moves]) {
   while (lab.dataset.state !== 'done') await frame();
   times.sort((a, b) => a - b);
   return {
-    slice: times[times.length >> 1],
+    frame: times[times.length >> 1],
     draws: drawn / moves,
     surfaces: performance.now() - lifted,
     requests: messages.requests - requests,

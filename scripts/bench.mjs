@@ -190,8 +190,8 @@ function latencyRows({ host, step, stroke }) {
         `${step.copied.toFixed(1)} MB copied before`,
     ],
     [
-      '  pen to slice',
-      `${stroke.slice.toFixed(0)} ms`,
+      '  frame with a movement of the pen',
+      `${stroke.frame.toFixed(0)} ms`,
       `${stroke.draws.toFixed(1)} images drawn on slices for each movement`,
     ],
     ['  pen lifted to smooth surfaces', `${stroke.surfaces.toFixed(0)} ms`, `${stroke.requests} messages a stroke`],

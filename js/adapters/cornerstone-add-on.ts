@@ -104,7 +104,8 @@ class AddOn {
           : this.#other.computeSurfaceData(id, options),
       updateSurfaceData: async (id, options) => {
         if (this.#known.has(id)) this.#update(id);
-        else await this.#other?.updateSurfaceData?.(id, options);
+        // Those that are being created follow at the end.
+        else if (!this.#making.has(id)) await this.#other?.updateSurfaceData?.(id, options);
       },
       surfaces: (id) => this.#known.get(id),
       dispose: () => this.#dispose(),

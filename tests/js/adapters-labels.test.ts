@@ -524,10 +524,17 @@ test('Cornerstone: what changes while the surfaces are created is followed, and 
   frames();
   const labels = labelMap();
   const { core, tools, eventTarget } = cornerstone(labels);
-  const addOn = cornerstoneAddOn({ ...classes, core, tools });
+  const asked: string[] = [];
+  const addOn = cornerstoneAddOn(
+    { ...classes, core, tools },
+    { updateSurfaceData: async (id: string) => void asked.push(id) },
+  );
   addOn.init();
   const making = addOn.computeSurfaceData('heart');
   box(labels, 2, [9, 6, 1], [12, 9, 6]);
+  // Another add-on has nothing to do with them.
+  await addOn.updateSurfaceData('heart');
+  expect(asked).toEqual([]);
   await making;
   expect(contained(addOn.surfaces('heart')?.mesh(2), cornerstoneWorld([10, 7, 3]))).toEqual([true]);
   const again = addOn.computeSurfaceData('heart');

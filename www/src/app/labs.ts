@@ -125,7 +125,7 @@ export class Labs {
       const make = await kind.load();
       if (turn !== this.#turn) return;
       this.#lab = make({
-        ...{ root: this.#root, help: this.#help, sessionWorker },
+        ...{ root: this.#root, help: this.#help, guide: kind.guide, sessionWorker },
         passOn: (passedOn) => this.#passOn(passedOn),
       });
       this.#keeping.follow(kind.id, this.#lab, kept?.id);

@@ -200,6 +200,8 @@ export type ReplyMessage = { id: number; ok: true; body: unknown } | { id: numbe
 export interface StateEvent {
   event: 'state';
   state: 'running' | 'paused' | 'done';
+  /** Measures of the surface, where they come with the state. */
+  measures?: Measures;
 }
 export interface FailureEvent {
   event: 'failure';

@@ -65,6 +65,8 @@ export type OpenInLab = (passedOn: Handoff) => void;
 export interface LabPlace {
   root: HTMLElement;
   help: HTMLElement;
+  /** Address of the lab's page in the documentation. */
+  guide: string;
   passOn: OpenInLab;
   /** Starts a worker that reads sessions of all labs, with messages in the language `name`. */
   sessionWorker: (name: string) => Worker;

@@ -1,9 +1,8 @@
-import { GUIDES } from '../kit/guides';
 import { mayLose } from '../kit/question';
 import { offerShortcuts, type Shortcut } from '../kit/shortcuts';
 import type { LabState } from '../kit/state';
 import { text } from '../texts';
-import { copyAddress, FILE_NOTE, showAddress } from './address';
+import { copyAddress, FILE_NOTE, type LabId, showAddress } from './address';
 import type { Listed } from './example-panel';
 import type { Captured, Handoff, Lab, LabPlace, OpenInLab } from './lab';
 import type { AnyOpening, Source } from './opening';
@@ -22,7 +21,7 @@ type AnySource<Example> = Source<Example, unknown, unknown>;
 
 /** A lab, as its shell uses it. */
 export interface ShelledLab<Example extends Listed> {
-  readonly id: keyof typeof GUIDES;
+  readonly id: LabId;
   readonly client: Engine;
   readonly ui: { readonly page: LabPage<Example>; readonly run?: RunControls; dispose(): void };
   readonly states: LabStates;
@@ -60,18 +59,16 @@ export class LabShell<Example extends Listed> implements Lab {
   onShowKept: () => void = () => undefined;
   readonly root: HTMLElement;
   readonly passOn: OpenInLab;
-  readonly #sessionWorker: LabPlace['sessionWorker'];
   /** Aborted when the lab is closed, which removes all event listeners. */
   readonly #closing = new AbortController();
-  readonly #help: HTMLElement;
+  readonly #place: LabPlace;
   readonly #lab: ShelledLab<Example>;
   #sessions: Sessions<Example> | undefined;
 
-  constructor({ root, help, passOn, sessionWorker }: LabPlace, lab: ShelledLab<Example>) {
-    this.root = root;
-    this.#help = help;
-    this.passOn = passOn;
-    this.#sessionWorker = sessionWorker;
+  constructor(place: LabPlace, lab: ShelledLab<Example>) {
+    this.root = place.root;
+    this.passOn = place.passOn;
+    this.#place = place;
     this.#lab = lab;
   }
 
@@ -85,7 +82,7 @@ export class LabShell<Example extends Listed> implements Lab {
     const { id, ui, states, opening } = this.#lab;
     this.#sessions = new Sessions({
       ...{ id, states, opening, work: this.work, passOn: this.passOn, page: ui.page },
-      sessionWorker: this.#sessionWorker,
+      sessionWorker: this.#place.sessionWorker,
       ...(ui.run && { run: ui.run }),
       address: (source) => this.#lab.address(source),
       content: () => this.#lab.sessionContent(),
@@ -106,7 +103,7 @@ export class LabShell<Example extends Listed> implements Lab {
       shown: text('labs.keyEscape'),
       ...(this.#lab.escape ?? { text: text('labs.dismissKey'), act: () => this.dismiss() }),
     };
-    offerShortcuts([...shortcuts, onEscape], this.#help, GUIDES[id], this.signal);
+    offerShortcuts([...shortcuts, onEscape], this.#place.help, this.#place.guide, this.signal);
   }
 
   /** Opens what another lab passes on, or what the address asks for, or else the first example, and runs it. */

@@ -85,6 +85,8 @@ export class SlicePanel {
   #window: DisplayWindow;
   #crosshair: Vec3 = [0, 0, 0];
   #color = '#f80';
+  /** The animation frame in which it is drawn; 0 if it is up to date. */
+  #frame = 0;
 
   constructor(volume: VolumeView, orientation: SliceOrientation, inverse: Float64Array, events: PanelEvents) {
     this.#volume = volume;
@@ -180,11 +182,19 @@ export class SlicePanel {
     this.draw();
   }
 
+  /** Draws in the next animation frame, once, however often it is called before. */
+  draw(): void {
+    this.#frame ||= requestAnimationFrame(() => {
+      this.#frame = 0;
+      this.#drawNow();
+    });
+  }
+
   /**
    * Draws the slice image, the crosshair, the surface's outline and all overlays on the visible canvas, at the
    * resolution of the screen, but at most two pixels per CSS pixel.
    */
-  draw(): void {
+  #drawNow(): void {
     const { clientWidth, clientHeight } = this.#canvas;
     const context = context2d(this.#canvas);
     if (!context || clientWidth === 0) return;
@@ -217,6 +227,7 @@ export class SlicePanel {
   }
 
   dispose(): void {
+    cancelAnimationFrame(this.#frame);
     this.#observer.disconnect();
     this.element.remove();
   }

@@ -185,6 +185,7 @@ class ExtractLab implements RunningLab<Example> {
   }
 
   #onEvent(event: WorkerEvent): void {
+    if (event.event === 'state' && event.measures) this.ui.measures.showMeasures(event.measures);
     if (this.#runs.takes(event)) return;
     if (event.event === 'comparing') this.ui.compare.showProgress(event);
     else if (event.event === 'data') this.ui.large.showProgress(event);

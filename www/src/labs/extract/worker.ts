@@ -266,10 +266,14 @@ class Session {
     send({ event: 'data', ...data });
   }
 
-  #stepped(report: StepReport): void {
+  #record(report: StepReport): void {
     this.#reports.push(report);
     this.#done = report.done;
     this.#iteration = report.iteration;
+  }
+
+  #stepped(report: StepReport): void {
+    this.#record(report);
     if (this.#free.length === 0) {
       this.#flushReports();
       return;
@@ -301,13 +305,15 @@ class Session {
       await this.#begin(model, count);
       return;
     }
-    for (let i = 0; i < count && !this.#done; i++) this.#stepped(model.step(1));
+    for (let i = 0; i < count && !this.#done; i++) this.#record(model.step(1));
     this.#reportStopped();
   }
 
+  /** Sends the surface, and then its measures, since the check of a large one takes longer than all else. */
   #reportStopped(): void {
-    this.#snapshot('checked');
-    send({ event: 'state', state: this.#done ? 'done' : 'paused' });
+    this.#snapshot('plain');
+    const measures = this.#measure(this.#current().mesh, true);
+    send({ event: 'state', state: this.#done ? 'done' : 'paused', measures });
   }
 
   /** Reports a run that failed: first that it has stopped, since the page shows a failure on top of that, and checks last. */
@@ -426,7 +432,7 @@ class Session {
   async #seed(): Promise<number> {
     await this.#pause();
     const report = this.#current().seed();
-    this.#stepped(report);
+    this.#record(report);
     this.#reportStopped();
     return report.events.seeds;
   }

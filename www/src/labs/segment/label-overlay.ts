@@ -46,26 +46,56 @@ export class LabelPicture {
     const { axis, horizontal, vertical } = this.#orientation;
     const { width, height } = this.canvas;
     const strides = [1, dims[0], dims[0] * dims[1]] as const;
-    const out = this.#pixels.data;
-    const alpha = Math.round(255 * opacity);
+    const out = new Uint32Array(this.#pixels.data.buffer);
+    const shades = shadesOf({ colors, opacity, paint });
     const counts = new Map<number, number>();
-    out.fill(0);
+    // Neighbours mostly have the same label.
+    let [last, count] = [0, 0];
+    let { plain, painted } = shades(0);
     for (let j = 0; j < height; j++) {
       const row = index * strides[axis] + (vertical.flip ? height - 1 - j : j) * strides[vertical.axis];
       for (let i = 0; i < width; i++) {
         const voxel = row + (horizontal.flip ? width - 1 - i : i) * strides[horizontal.axis];
         const label = voxels[voxel] ?? 0;
-        if (label !== 0) counts.set(label, (counts.get(label) ?? 0) + 1);
-        const color = label === 0 ? undefined : colors.get(label);
-        const target = 4 * (j * width + i);
-        const isPainted = mask !== undefined && mask[voxel] !== 0;
-        if (color && alpha > 0) put(out, target, ...(isPainted ? lighter(color) : color), alpha);
-        else if (isPainted) put(out, target, ...paint, TINT);
+        if (label !== last) {
+          counts.set(last, (counts.get(last) ?? 0) + count);
+          [last, count] = [label, 0];
+          ({ plain, painted } = shades(label));
+        }
+        count += 1;
+        out[j * width + i] = mask !== undefined && mask[voxel] !== 0 ? painted : plain;
       }
     }
+    counts.set(last, (counts.get(last) ?? 0) + count);
+    counts.delete(0);
     context2d(this.canvas)?.putImageData(this.#pixels, 0, 0);
     return counts;
   }
+}
+
+/** The pixels of a label, as numbers. */
+interface Shades {
+  plain: number;
+  /** In the mask of the threshold brush. */
+  painted: number;
+}
+
+/** Returns a function that returns the pixels of a label. */
+function shadesOf({
+  colors,
+  opacity,
+  paint,
+}: Pick<Overlays, 'colors' | 'opacity' | 'paint'>): (label: number) => Shades {
+  const alpha = Math.round(255 * opacity);
+  const known = new Map<number, Shades>();
+  const background = { plain: 0, painted: pixel(paint, TINT) };
+  return (label) => {
+    const color = label === 0 || alpha === 0 ? undefined : colors.get(label);
+    if (!color) return background;
+    const shades = known.get(label) ?? { plain: pixel(color, alpha), painted: pixel(lighter(color), alpha) };
+    known.set(label, shades);
+    return shades;
+  };
 }
 
 function lighter([red, green, blue]: readonly [number, number, number]): [number, number, number] {
@@ -73,9 +103,7 @@ function lighter([red, green, blue]: readonly [number, number, number]): [number
   return [mix(red), mix(green), mix(blue)];
 }
 
-function put(out: Uint8ClampedArray, at: number, red: number, green: number, blue: number, alpha: number): void {
-  out[at] = red;
-  out[at + 1] = green;
-  out[at + 2] = blue;
-  out[at + 3] = alpha;
+/** Returns a pixel of image data as one number. */
+function pixel(color: readonly [number, number, number], alpha: number): number {
+  return new Uint32Array(Uint8ClampedArray.of(...color, alpha).buffer)[0] ?? 0;
 }

@@ -43,6 +43,8 @@ export class SegmentView {
   #options: SegmentViewOptions;
   #scene: VolumeScene | undefined;
   #pictures: LabelPicture[] = [];
+  /** Axes of the slices whose labels may have changed since they were painted. */
+  readonly #stale = new Set<Axis>();
   #outlines: LabelOutlines | undefined;
   #overlays: Omit<Overlays, 'opacity'> | undefined;
   #hidden: ReadonlySet<number> = new Set();
@@ -78,6 +80,7 @@ export class SegmentView {
         onHover: (at) => this.#hover(at, axis),
       });
       this.#pictures[axis] = new LabelPicture(volume.dims, orientation);
+      this.#stale.add(axis);
       panel.overlay = (context, scaleX, scaleY) => this.#drawOver(panel, context, scaleX, scaleY);
       return panel;
     });
@@ -216,23 +219,22 @@ export class SegmentView {
     if (!scene) return;
     const moved = ([0, 1, 2] as const).filter((axis) => this.#crosshair[axis] !== index[axis]);
     this.#crosshair = index;
-    this.#paintPictures(moved);
+    for (const axis of moved) this.#stale.add(axis);
     scene.moveTo(index);
   }
 
+  /** Has all slices drawn again, with the labels as they are then. */
   #paint(): void {
-    this.#paintPictures([0, 1, 2]);
+    for (const axis of [0, 1, 2] as const) this.#stale.add(axis);
     this.#redraw();
   }
 
-  #paintPictures(axes: readonly Axis[]): void {
-    if (!this.#overlays) return;
-    const overlays = { ...this.#overlays, opacity: this.#options.opacity };
-    for (const axis of axes) {
-      const counts = this.#pictures[axis]?.paint(overlays, this.#crosshair[axis]);
-      const panel = this.#scene?.panels[axis];
-      if (counts && panel) panel.content = describe(counts, overlays.names);
-    }
+  /** Paints the labels of a slice if they may have changed: once for a frame, however many movements of the pen it has. */
+  #refresh(panel: SlicePanel, picture: LabelPicture): void {
+    const { axis } = panel.orientation;
+    if (!this.#overlays || !this.#stale.delete(axis)) return;
+    const counts = picture.paint({ ...this.#overlays, opacity: this.#options.opacity }, this.#crosshair[axis]);
+    if (counts) panel.content = describe(counts, this.#overlays.names);
   }
 
   #redraw(): void {
@@ -247,6 +249,7 @@ export class SegmentView {
   #drawOver(panel: SlicePanel, context: CanvasRenderingContext2D, scaleX: number, scaleY: number): void {
     const picture = this.#pictures[panel.orientation.axis];
     if (!picture) return;
+    this.#refresh(panel, picture);
     context.imageSmoothingEnabled = false;
     context.drawImage(picture.canvas, 0, 0, picture.canvas.width * scaleX, picture.canvas.height * scaleY);
     if (this.#options.outlines) this.#drawOutlines(panel, context, scaleX, scaleY);
