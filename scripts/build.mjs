@@ -128,10 +128,7 @@ async function make(module, way, sources) {
   const into = folder(module);
   const compiled = await compileInTurn(module, way);
   await rm(into, { recursive: true, force: true });
-  await must('cargo', [
-    ...['run', '--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')],
-    ...['--', 'bindgen', compiled, into, glueName(module)],
-  ]);
+  await must('cargo', ['run', ...XTASK, '--', 'bindgen', compiled, into, glueName(module)]);
   if (way.optimises) await optimise(made(module));
   await writeFile(stampFile(module), stampOf(way, sources));
 }
@@ -237,6 +234,16 @@ async function buildAll(modules, sources) {
   await Promise.all(modules.map((module) => make(module, WAYS.release, sources)));
   if (modules.includes(PLAIN)) await compareGlue();
   await assemble(modules);
+}
+
+const XTASK = ['--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')];
+
+/** Compiles what a quick build needs, unless it is there: the part of it for which no npm packages are needed. */
+export async function compileQuick() {
+  const sources = await sourceHash();
+  const all = await Promise.all(MODULES.map((module) => isMade(module, WAYS.release, sources)));
+  if (!all.includes(false) || (await isMade(WHOLE, WAYS.quick, sources))) return;
+  await Promise.all([compile(WHOLE, WAYS.quick), must('cargo', ['build', ...XTASK])]);
 }
 
 /** The whole library stands in for its parts, which have the same classes. */

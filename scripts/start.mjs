@@ -1,9 +1,9 @@
 // Sets up, builds the package and the app, and serves it on PORT; by default on 5173 or, if that is taken, any free
 // port.
 import { buildApp } from './app.mjs';
-import { build } from './build.mjs';
+import { build, compileQuick } from './build.mjs';
 import { serveApp } from './serve.mjs';
-import { setup } from './setup.mjs';
+import { installPackages, setup } from './setup.mjs';
 import { at, say, script } from './shell.mjs';
 
 async function listen() {
@@ -13,7 +13,9 @@ async function listen() {
 }
 
 await script(async () => {
-  await setup({ browser: false });
+  await setup({ browser: false, packages: false });
+  // Compiling does not keep both cores busy.
+  await Promise.all([installPackages(), compileQuick()]);
   await build({ quick: true });
   await buildApp();
   const { address } = await listen();
