@@ -238,12 +238,9 @@ async function buildAll(modules, sources) {
 
 const XTASK = ['--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')];
 
-/** Compiles what a quick build needs, unless it is there: the part of it for which no npm packages are needed. */
-export async function compileQuick() {
-  const sources = await sourceHash();
-  const all = await Promise.all(MODULES.map((module) => isMade(module, WAYS.release, sources)));
-  if (!all.includes(false) || (await isMade(WHOLE, WAYS.quick, sources))) return;
-  await Promise.all([compile(WHOLE, WAYS.quick), must('cargo', ['build', ...XTASK])]);
+/** Compiles the tool that makes the glue of the modules, unless it is there; no npm packages are needed for it. */
+export async function compileTool() {
+  await must('cargo', ['build', ...XTASK]);
 }
 
 /** The whole library stands in for its parts, which have the same classes. */

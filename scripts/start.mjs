@@ -1,7 +1,7 @@
 // Sets up, builds the package and the app, and serves it on PORT; by default on 5173 or, if that is taken, any free
 // port.
 import { buildApp } from './app.mjs';
-import { build, compileQuick } from './build.mjs';
+import { build, compileTool } from './build.mjs';
 import { serveApp } from './serve.mjs';
 import { installPackages, setup } from './setup.mjs';
 import { at, say, script } from './shell.mjs';
@@ -14,8 +14,8 @@ async function listen() {
 
 await script(async () => {
   await setup({ browser: false, packages: false });
-  // Compiling does not keep both cores busy.
-  await Promise.all([installPackages(), compileQuick()]);
+  // The compilation of the module keeps both cores busy: beside it, all three take longer.
+  await Promise.all([installPackages(), compileTool()]);
   await build({ quick: true });
   await buildApp();
   const { address } = await listen();
