@@ -128,7 +128,10 @@ async function make(module, way, sources) {
   const into = folder(module);
   const compiled = await compileInTurn(module, way);
   await rm(into, { recursive: true, force: true });
-  await must('cargo', ['run', ...XTASK, '--', 'bindgen', compiled, into, glueName(module)]);
+  await must('cargo', [
+    ...['run', '--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')],
+    ...['--', 'bindgen', compiled, into, glueName(module)],
+  ]);
   if (way.optimises) await optimise(made(module));
   await writeFile(stampFile(module), stampOf(way, sources));
 }
@@ -234,13 +237,6 @@ async function buildAll(modules, sources) {
   await Promise.all(modules.map((module) => make(module, WAYS.release, sources)));
   if (modules.includes(PLAIN)) await compareGlue();
   await assemble(modules);
-}
-
-const XTASK = ['--locked', '--quiet', '--package', 'xtask', '--target-dir', at('target/xtask')];
-
-/** Compiles the tool that makes the glue of the modules, unless it is there; no npm packages are needed for it. */
-export async function compileTool() {
-  await must('cargo', ['build', ...XTASK]);
 }
 
 /** The whole library stands in for its parts, which have the same classes. */

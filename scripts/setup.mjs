@@ -45,8 +45,7 @@ async function addTarget() {
   say('wasm target', 'added');
 }
 
-/** Installs the npm packages of the lock file, unless they are there. */
-export async function installPackages() {
+async function installPackages() {
   const installed = at('node_modules', '.package-lock.json');
   const fresh = existsSync(installed) && statSync(installed).mtimeMs >= statSync(at('package-lock.json')).mtimeMs;
   if (fresh) return say('packages', 'present');
@@ -75,15 +74,12 @@ async function installChromium() {
   return findChromium();
 }
 
-/**
- * Runs the parts of the set-up in order. Throws if something is missing that this script must not install. `packages`:
- * with the npm packages.
- */
-export async function setup({ browser = true, packages = true } = {}) {
+/** Runs all parts of the set-up in order. Throws if something is missing that this script must not install. */
+export async function setup({ browser = true } = {}) {
   checkNode();
   await checkRust();
   await addTarget();
-  if (packages) await installPackages();
+  await installPackages();
   if (browser) await findOrInstallChromium();
 }
 

@@ -1,9 +1,9 @@
 // Sets up, builds the package and the app, and serves it on PORT; by default on 5173 or, if that is taken, any free
 // port.
 import { buildApp } from './app.mjs';
-import { build, compileTool } from './build.mjs';
+import { build } from './build.mjs';
 import { serveApp } from './serve.mjs';
-import { installPackages, setup } from './setup.mjs';
+import { setup } from './setup.mjs';
 import { at, say, script } from './shell.mjs';
 
 async function listen() {
@@ -13,9 +13,7 @@ async function listen() {
 }
 
 await script(async () => {
-  await setup({ browser: false, packages: false });
-  // The compilation of the module keeps both cores busy: beside it, all three take longer.
-  await Promise.all([installPackages(), compileTool()]);
+  await setup({ browser: false });
   await build({ quick: true });
   await buildApp();
   const { address } = await listen();
