@@ -17,7 +17,7 @@ import type { WorkerEvent } from './protocol';
 import { ExtractResults } from './results';
 import { ExtractSettings } from './settings';
 
-/** The Extract lab: a deformable surface is fitted to a volume. Opening, settings and results are in files of their own. */
+/** The Extract lab: a deformable surface is fitted to a volume. Data, settings and results are in files of their own. */
 class ExtractLab implements RunningLab<Example> {
   readonly shell: LabShell<Example>;
   readonly #runs: Runs<Example>;

@@ -26,7 +26,7 @@ import { ReconstructSettings } from './settings';
  */
 const VOLUME_SIZE = 96;
 
-/** The Reconstruct lab: an implicit surface is fitted to points. Opening, settings and results are in files of their own. */
+/** The Reconstruct lab: an implicit surface is fitted to points. Data, settings and results are in files of their own. */
 class ReconstructLab implements RunningLab<CloudExample> {
   readonly shell: LabShell<CloudExample>;
   readonly #runs: Runs<CloudExample>;

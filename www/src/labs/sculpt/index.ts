@@ -33,7 +33,7 @@ const QUANTITIES: readonly string[] = [
 ] satisfies SculptQuantity[];
 
 /**
- * The Sculpt lab: a detailed surface is deformed by ellipsoids. Opening, settings, posing, filming and results are in
+ * The Sculpt lab: a detailed surface is deformed by ellipsoids. Data, settings, posing, filming and results are in
  * files of their own.
  */
 class SculptLab implements RunningLab<SculptExample> {

@@ -44,7 +44,7 @@ const NO_OVERLAYS: Pick<Overlays, 'colors' | 'names' | 'paint' | 'mask'> = {
 };
 
 /**
- * The Segment lab: labels are painted on slices, and their surfaces follow. Opening, editing and saving are in files of
+ * The Segment lab: labels are painted on slices, and their surfaces follow. Data, editing and saving are in files of
  * their own.
  */
 class SegmentLab implements ShelledLab<SegmentExample> {

@@ -29,7 +29,7 @@ import type { TrackContent } from './schema';
 import { type TrackMoment, TrackSettings } from './settings';
 
 /**
- * The Track lab: a surface is tracked through the frames of a 4D image. Opening, settings, results and comparison are in
+ * The Track lab: a surface is tracked through the frames of a 4D image. Data, settings, results and comparison are in
  * files of their own.
  */
 class TrackLab implements RunningLab<TrackExample> {
