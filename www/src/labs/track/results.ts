@@ -205,7 +205,7 @@ export class TrackResults {
       unit: this.#unit,
     });
     const errors = this.#frames.map(({ error }) => error);
-    table.show(facts, errors, this.#history.reports.at(-1)?.warnings ?? [], this.#frame);
+    table.show(facts, errors, this.#frame);
   }
 
   /** Unit of lengths of the image, for the volume curve. */

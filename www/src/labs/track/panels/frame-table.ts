@@ -2,7 +2,7 @@ import { h } from '../../../kit/dom';
 import { count, figure } from '../../../kit/format';
 import { plural, text } from '../../../texts';
 import { warningsOf } from '../curve';
-import type { FrameStatistics, StepReport, SurfaceError } from '../protocol';
+import type { FrameStatistics, SurfaceError } from '../protocol';
 
 interface Column {
   head: string;
@@ -51,12 +51,6 @@ const COLUMNS: Column[] = [
 
 const round = (value: number) => Number(value.toPrecision(3));
 
-/** Returns a warning of the tracker in words, with the number of the frame that it concerns. */
-function toldWarning({ text: told, where }: StepReport['warnings'][number]): string {
-  const frame = where && 'frame' in where ? where.frame + 1 : undefined;
-  return frame === undefined ? `${told}.` : text('trackPanels.frameWarning', { frame, told });
-}
-
 /**
  * Table of the Track lab with the statistics of each frame, and warnings about folded triangles and jumps of the area.
  */
@@ -65,7 +59,6 @@ export class FrameTable {
   readonly element: HTMLElement;
   readonly #table = h('table', { class: 'times' });
   #facts: readonly FrameStatistics[] = [];
-  #found: StepReport['warnings'] = [];
   #rows: HTMLElement[] = [];
 
   constructor() {
@@ -78,19 +71,10 @@ export class FrameTable {
     );
   }
 
-  /** Shows the statistics and errors of frames, with `found`, the tracker's own warnings, and marks the current `frame`. */
-  show(
-    facts: readonly FrameStatistics[],
-    errors: readonly (SurfaceError | undefined)[],
-    found: StepReport['warnings'],
-    frame: number,
-  ): void {
-    const isNew =
-      facts.length !== this.#facts.length ||
-      facts.some((one, i) => one !== this.#facts[i]) ||
-      found.length !== this.#found.length;
+  /** Shows the statistics and errors of frames, and marks the current `frame`. */
+  show(facts: readonly FrameStatistics[], errors: readonly (SurfaceError | undefined)[], frame: number): void {
+    const isNew = facts.length !== this.#facts.length || facts.some((one, i) => one !== this.#facts[i]);
     this.#facts = facts;
-    this.#found = found;
     if (isNew) this.#fill(facts, errors);
     for (const [i, row] of this.#rows.entries()) {
       if (i === frame) row.setAttribute('aria-current', 'true');
@@ -129,9 +113,8 @@ export class FrameTable {
       ...(jumped.length > 0
         ? [plural('trackPanels.areaWarning', jumped.length, { most: percent(jumped.map(({ share }) => share)) })]
         : []),
-      ...this.#found.map(toldWarning),
     ];
-    this.warnings.dataset.warnings = String(found.length + this.#found.length);
+    this.warnings.dataset.warnings = String(found.length);
     const warnings = texts.join(' ');
     if (this.warnings.textContent !== warnings) this.warnings.textContent = warnings;
   }
