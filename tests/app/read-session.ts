@@ -1,4 +1,4 @@
-import { SCHEMAS } from '../../www/src/app/session-schemas';
+import { SCHEMAS } from '../../www/src/app/session/schemas';
 import type { Session } from '../../www/src/lab/session/check';
 import { readSession as read } from '../../www/src/lab/session/file';
 import type { ExtractContent } from '../../www/src/labs/extract/schema';

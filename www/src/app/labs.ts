@@ -9,7 +9,7 @@ import type { Kept } from './kept-store';
 import { LABS, labCalled } from './list';
 
 const sessionWorker = (name: string) =>
-  new Worker(new URL('./session-worker.ts', import.meta.url), { type: 'module', name });
+  new Worker(new URL('./session/worker.ts', import.meta.url), { type: 'module', name });
 
 /**
  * Opens and closes the labs on the page: one is open at a time. The address of a closed lab, which contains its

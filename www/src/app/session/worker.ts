@@ -1,7 +1,7 @@
 /** Worker that reads a session, so that the page answers meanwhile. */
-import { readSession } from '../lab/session/file';
-import type { Reply } from '../lab/session/protocol';
-import { SCHEMAS } from './session-schemas';
+import { readSession } from '../../lab/session/file';
+import type { Reply } from '../../lab/session/protocol';
+import { SCHEMAS } from './schemas';
 
 self.onmessage = async ({ data }: MessageEvent<Uint8Array>) => {
   try {
