@@ -1,6 +1,6 @@
 // Times the surfaces of a label map in a page: on the main thread in slices of work, in `vesicle/worker`, by our adapter
-// for Cornerstone3D, and by the package
-// that Cornerstone3D calls for them, in a worker as there. Runs in Node; what a page runs is `window.measureLabels`.
+// for Cornerstone3D, and by the package that Cornerstone3D calls for them, in a worker as there. Runs in Node; what a page
+// runs is `window.measureLabels`.
 import { readdir, readFile } from 'node:fs/promises';
 import { launchChromium } from '../scripts/chromium.mjs';
 import { serve } from '../scripts/serve.mjs';

@@ -18,7 +18,7 @@ export const LABS: [LabKind, ...LabKind[]] = [
     tagline: text('shell.extractTagline'),
     guide: GUIDES.extract,
     spawn: spawnExtract,
-    load: async () => (await import('../labs/extract')).openExtract,
+    load: async () => (await import('../labs/extract')).makeExtract,
   },
   {
     id: 'reconstruct',
@@ -26,7 +26,7 @@ export const LABS: [LabKind, ...LabKind[]] = [
     tagline: text('shell.reconstructTagline'),
     guide: GUIDES.reconstruct,
     spawn: spawnReconstruct,
-    load: async () => (await import('../labs/reconstruct')).openReconstruct,
+    load: async () => (await import('../labs/reconstruct')).makeReconstruct,
   },
   {
     id: 'track',
@@ -34,7 +34,7 @@ export const LABS: [LabKind, ...LabKind[]] = [
     tagline: text('shell.trackTagline'),
     guide: GUIDES.track,
     spawn: spawnTrack,
-    load: async () => (await import('../labs/track')).openTrack,
+    load: async () => (await import('../labs/track')).makeTrack,
   },
   {
     id: 'sculpt',
@@ -42,7 +42,7 @@ export const LABS: [LabKind, ...LabKind[]] = [
     tagline: text('shell.sculptTagline'),
     guide: GUIDES.sculpt,
     spawn: spawnSculpt,
-    load: async () => (await import('../labs/sculpt')).openSculpt,
+    load: async () => (await import('../labs/sculpt')).makeSculpt,
   },
   {
     id: 'segment',
@@ -50,7 +50,7 @@ export const LABS: [LabKind, ...LabKind[]] = [
     tagline: text('shell.segmentTagline'),
     guide: GUIDES.segment,
     spawn: spawnSegment,
-    load: async () => (await import('../labs/segment')).openSegment,
+    load: async () => (await import('../labs/segment')).makeSegment,
   },
 ];
 

@@ -1,18 +1,17 @@
 import { RequestError } from '../engine/channel';
-import type { CodeRequest, CodeRequests, Failure, Measures, RunCode } from '../engine/protocol';
+import type { CodeRequest, CodeRequests, FailureEvent, Measures, RunCode, StateEvent } from '../engine/protocol';
 import { labShortcuts, type Shortcut } from '../kit/shortcuts';
 import { plural, text } from '../texts';
 import type { Listed } from './example-panel';
 import type { LabPage } from './page';
 import type { RunControls, RunEvents } from './run-controls';
-import type { LabShell, ShelledLab } from './shell';
+import type { Engine, LabShell, ShelledLab } from './shell';
 
 /** Events that the workers of all labs send. */
-type EngineEvent = { event: 'failure'; failure: Failure } | { event: 'state'; state: 'running' | 'paused' | 'done' };
+type EngineEvent = FailureEvent | StateEvent;
 
 /** The worker of a lab whose model runs. */
-interface RunEngine {
-  close(): void;
+interface RunEngine extends Engine {
   request(kind: 'play' | 'pause', body: undefined): Promise<unknown>;
   request(kind: 'step', body: { count: number }): Promise<unknown>;
   request(kind: 'code', body: CodeRequest): Promise<RunCode>;

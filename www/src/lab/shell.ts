@@ -13,7 +13,7 @@ import type { LabStates } from './states';
 import { Work } from './work';
 
 /** The lab's worker, as the shell uses it. */
-interface Engine {
+export interface Engine {
   close(): void;
 }
 

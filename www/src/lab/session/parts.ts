@@ -94,6 +94,12 @@ export const steps = call('step', count);
 export const undoable = <const Entries extends ObjectEntries>(entries: Entries) =>
   list(object({ label: name, ...entries }), 1000);
 
+/** Fields of a session with saved states: that of the present, those to undo and to redo, and reports. */
+export const states = <const Entries extends ObjectEntries>(moment: Entries) => ({
+  ...moment,
+  ...{ undo: undoable(moment), redo: undoable(moment), reports },
+});
+
 /** Position in the lists of reports. */
 export const history = object({ list: count, iteration: count });
 

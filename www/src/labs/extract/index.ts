@@ -207,4 +207,4 @@ class ExtractLab implements RunningLab<Example> {
 }
 
 /** Makes the Extract lab. */
-export const openExtract = (place: LabPlace): Lab => new ExtractLab(place).shell;
+export const makeExtract = (place: LabPlace): Lab => new ExtractLab(place).shell;

@@ -4,18 +4,7 @@ import { type InferOutput, literal, object, optional, picklist, undefined_, vari
 import type { ColorMode } from '../../kit/view-options';
 import { MOST_ATTRACTORS } from '../../lab/attractors';
 import type { ContentOf } from '../../lab/session/check';
-import {
-  call,
-  camera,
-  history,
-  log,
-  markMismatch,
-  placement,
-  reports,
-  session,
-  steps,
-  undoable,
-} from '../../lab/session/parts';
+import { call, camera, history, log, markMismatch, placement, session, states, steps } from '../../lab/session/parts';
 import { bytes, count, flag, list, maybe, oneOf, params, real, vec3 } from '../../lab/session/values';
 
 const start = variant('kind', [
@@ -62,7 +51,7 @@ export type ExtractContent = ContentOf<typeof schema>;
 
 export const schema = object({
   ...{ lab: literal('extract'), ...session },
-  ...{ ...moment, undo: undoable(moment), redo: undoable(moment), reports, view: optional(view) },
+  ...{ ...states(moment), view: optional(view) },
 });
 
 /** Returns the path of the first field of a session that refers to something that it does not have. */

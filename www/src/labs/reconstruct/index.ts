@@ -223,4 +223,4 @@ class ReconstructLab implements RunningLab<CloudExample> {
 }
 
 /** Makes the Reconstruct lab. */
-export const openReconstruct = (place: LabPlace): Lab => new ReconstructLab(place).shell;
+export const makeReconstruct = (place: LabPlace): Lab => new ReconstructLab(place).shell;

@@ -294,4 +294,4 @@ class SculptLab implements RunningLab<SculptExample> {
 }
 
 /** Makes the Sculpt lab. */
-export const openSculpt = (place: LabPlace): Lab => new SculptLab(place).shell;
+export const makeSculpt = (place: LabPlace): Lab => new SculptLab(place).shell;

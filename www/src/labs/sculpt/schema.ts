@@ -2,18 +2,7 @@
 
 import { type InferOutput, literal, minLength, object, optional, pipe, strictTuple, union, variant } from 'valibot';
 import type { ContentOf } from '../../lab/session/check';
-import {
-  call,
-  camera,
-  color,
-  history,
-  log,
-  markMismatch,
-  reports,
-  session,
-  steps,
-  undoable,
-} from '../../lab/session/parts';
+import { call, camera, color, history, log, markMismatch, session, states, steps } from '../../lab/session/parts';
 import { between, bytes, count, flag, list, maybe, name, oneOf, params, text, vec3 } from '../../lab/session/values';
 
 const pose = list(object({ center: vec3, axes: strictTuple([vec3, vec3, vec3]) }), 1000);
@@ -37,7 +26,7 @@ export type SculptContent = ContentOf<typeof schema>;
 
 export const schema = object({
   ...{ lab: literal('sculpt'), ...session },
-  ...{ ...moment, undo: undoable(moment), redo: undoable(moment), reports, view: optional(view) },
+  ...{ ...states(moment), view: optional(view) },
   ...{ params: optional(params, () => ({})), log: optional(log(object({ start: pose, params, support }), calls)) },
 });
 

@@ -512,4 +512,4 @@ class SegmentLab implements ShelledLab<SegmentExample> {
 }
 
 /** Makes the Segment lab. */
-export const openSegment = (place: LabPlace): Lab => new SegmentLab(place).shell;
+export const makeSegment = (place: LabPlace): Lab => new SegmentLab(place).shell;

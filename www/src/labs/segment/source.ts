@@ -58,7 +58,7 @@ export async function openImage({ files, labelling }: ImageSource, isSmall = fal
   try {
     const labels = map
       ? labelsOf(map, volume, { isBoth: map === image, isSmall })
-      : { ...computed(volume, labelling), warnings: doubts(image) };
+      : { ...computed(volume, labelling), warnings: nameWarnings(image) };
     const voxels = volume.frames === 1 ? displayed(image.init, volume.range) : undefined;
     return { volume, map: labels, unit: image.init.unit, looksLike, voxels };
   } catch (error) {
@@ -117,8 +117,8 @@ function alone(image: NamedVolume): Both {
   return { image, map: looksLike > 1 ? image : undefined, looksLike };
 }
 
-/** Returns what to know of a volume that is open without its labels. */
-function doubts(image: NamedVolume): Warning[] {
+/** Returns a warning about an image whose name says that it is a label map; none about others. */
+function nameWarnings(image: NamedVolume): Warning[] {
   if (!isNamed(image) || !hasIntegers(image)) return [];
   const { name } = image;
   return [{ code: 'reader', text: text('segment.openedAsImage', { name, button: text('segment.openMap') }) }];

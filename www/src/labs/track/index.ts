@@ -411,4 +411,4 @@ class TrackLab implements RunningLab<TrackExample> {
 }
 
 /** Makes the Track lab. */
-export const openTrack = (place: LabPlace): Lab => new TrackLab(place).shell;
+export const makeTrack = (place: LabPlace): Lab => new TrackLab(place).shell;

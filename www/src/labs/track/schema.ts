@@ -14,18 +14,7 @@ import {
 } from 'valibot';
 import type { Surface } from '../../engine/protocol';
 import type { ContentOf } from '../../lab/session/check';
-import {
-  call,
-  camera,
-  history,
-  log,
-  markMismatch,
-  placement,
-  reports,
-  session,
-  steps,
-  undoable,
-} from '../../lab/session/parts';
+import { call, camera, history, log, markMismatch, placement, session, states, steps } from '../../lab/session/parts';
 import {
   anyNumber,
   between,
@@ -102,7 +91,7 @@ export type TrackContent = ContentOf<typeof schema>;
 
 export const schema = object({
   ...{ lab: literal('track'), ...session },
-  ...{ ...moment, undo: undoable(moment), redo: undoable(moment), reports, view: optional(view) },
+  ...{ ...states(moment), view: optional(view) },
   frames: list(frame, 10_000),
 });
 
