@@ -24,7 +24,7 @@ export type WarningCode =
   | 'thin-label'
   /** Parts or gaps so thin that the points hardly tell them apart: topology and volume may be wrong. */
   | 'thin-parts'
-  /** A surface that has not as many parts as the object: a divided one in one surface, or one that has come apart. */
+  /** A surface that has not as many parts as the object: a divided one in one surface, one that another touches, or one that has come apart. */
   | 'parts'
   /** Normals that point inwards, so that inside and outside are exchanged. */
   | 'inward-normals'

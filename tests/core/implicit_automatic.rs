@@ -302,7 +302,7 @@ fn lambda_that_is_chosen_may_be_given_for_many_points() {
         (surface.choice().unwrap(), surface.evaluate(&[Vec3::ZERO, Vec3::X * 1.1]).unwrap())
     };
     let (chosen, values) = choice(ImplicitParams::default());
-    let length = 0.5 / chosen.density.sqrt() + 0.5 * chosen.noise;
+    let length = 0.25 / chosen.density.sqrt() + 0.95 * chosen.noise;
     // Half as much, as it is doubled for twice the usual number of points.
     let expected = length * length * length * chosen.density / 4.0 / 2.0;
     assert!((chosen.lambda_surface / expected - 1.0).abs() < 1e-9);

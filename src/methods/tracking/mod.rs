@@ -26,6 +26,7 @@ mod frame_tracker;
 mod labelling;
 mod lattice;
 mod motion;
+mod neighbours;
 mod organ;
 mod params;
 mod presence;

@@ -2,7 +2,6 @@
 //! surface is uncertain.
 
 use super::lattice::Lattice;
-use super::presence::inside_voxels;
 use super::region::Region;
 use super::{Cavity, SurfaceTracker};
 use crate::mesh::{TriangleMesh, measure};
@@ -48,6 +47,8 @@ pub(super) struct SurfaceFacts {
     is_cut: bool,
     /// Whether the object within the surface has more parts than the surface.
     is_divided: bool,
+    /// Whether another object touches it that was apart in the frame before.
+    is_touched: bool,
 }
 
 impl SurfaceTracker {
@@ -76,6 +77,7 @@ impl SurfaceTracker {
         warnings.extend(self.missing_boundary());
         warnings.extend(self.warning_of_frames(|facts| facts.is_cut, cut_by_box));
         warnings.extend(self.warning_of_frames(|facts| facts.is_divided, divided));
+        warnings.extend(self.warning_of_frames(|facts| facts.is_touched, touched));
         let with_handles = |frames| has_handles(frames, self.cavity, self.is_ring());
         warnings.extend(self.warning_of_frames(|facts| facts.genus > 0, with_handles));
         warnings
@@ -147,7 +149,8 @@ impl SurfaceTracker {
         let share = in_side.count() as f64 / mesh.positions.len() as f64;
         let parts = self.parts_within(frame, mesh, intensities, pauses).await;
         let is_divided = parts > measured.components;
-        SurfaceFacts { genus: genus.max(0) as u32, is_cut: share >= CUT, is_divided }
+        let is_touched = self.is_touched(frame, mesh, intensities, pauses).await;
+        SurfaceFacts { genus: genus.max(0) as u32, is_cut: share >= CUT, is_divided, is_touched }
     }
 
     /// Returns the number of parts of the bright voxels within a surface of a frame.
@@ -160,9 +163,7 @@ impl SurfaceTracker {
     ) -> usize {
         let Some([bright, dark]) = intensities else { return 0 };
         let (region, level) = (&self.region, dark + BRIGHT * (bright - dark));
-        let mut mesh = mesh.clone();
-        mesh.positions.iter_mut().for_each(|p| *p *= region.space.scale as f32);
-        let inside = inside_voxels(region, &mesh);
+        let inside = self.voxels_within(mesh);
         pauses.now().await;
         let image = region.frames[frame].iter().enumerate();
         let mask: Vec<bool> =
@@ -269,6 +270,12 @@ fn divided(frames: usize) -> (WarningCode, String) {
          touched it before; volume and area hold what joins the parts: track them one by one, each from where it is alone"
     );
     (WarningCode::Parts, text)
+}
+
+fn touched(_: usize) -> (WarningCode, String) {
+    let text = "another object touches the one that is tracked, from this frame on; the image shows them as one, so the surface \
+                may hold both, or a part of the other: use a box without it, or frames in which they are apart";
+    (WarningCode::Parts, text.into())
 }
 
 fn has_handles(frames: usize, cavity: Cavity, is_ring: bool) -> (WarningCode, String) {

@@ -26,8 +26,16 @@ const FEW_POINTS: usize = 100;
 const SPARSE_POINTS: usize = 200;
 /// Length that λ damps for few points, in units of the normalised box.
 const SPARSE_LENGTH: f64 = 0.1;
-/// Length that λ damps: a share of the distance between points, and one of the noise.
-const LENGTH: [f64; 2] = [0.5, 0.5];
+/// Length that λ damps, in distances between points, and in addition in units of the noise. Exact points would be interpolated
+/// with a length of 0, but noise is not measured that exactly.
+const LENGTH: [f64; 2] = [0.25, 0.95];
+/// Deviation of fits to many points, relative to that of fits to few, from which the former reach across walls, and the least
+/// difference of the two in distances between points: beside edges it is less.
+const ACROSS_WALLS: f64 = 1.5;
+const LEAST_ACROSS: f64 = 0.2;
+/// What the length and δ are multiplied by then: else the sides of a wall are drawn together.
+const LENGTH_OF_WALLS: f64 = 0.9;
+const SMOOTHNESS_OF_WALLS: f64 = 0.5;
 /// λ of constraints off the surface, relative to that of those on it, and the largest. They are soft, so that wrong ones
 /// yield.
 const SOFTNESS: [f64; 2] = [300.0, 2.0];
@@ -69,18 +77,23 @@ impl Choice {
         let noise = if points.len() < FEW_POINTS { 0.0 } else { lower(deviation(&wide), deviation(&narrow)) };
         let reach = f64::from(median(wide.iter().map(|fit| fit.radius)).unwrap_or(2.0));
         let within = NEIGHBOURS[0].min(points.len()) as f64;
-        Self::from_measures(points.len(), within / (PI * reach * reach), f64::from(noise))
+        let density = within / (PI * reach * reach);
+        let [many, few] = [&wide, &narrow].map(|fits| f64::from(deviation(fits)));
+        let has_walls = many > ACROSS_WALLS * few && (many - few) * density.sqrt() > LEAST_ACROSS;
+        Self::from_measures(points.len(), density, f64::from(noise), has_walls)
     }
 
-    /// Chooses for a number of points with a density and noise.
+    /// Chooses for a number of points with a density and noise; `has_walls` says whether walls are about as thin as the points
+    /// are apart.
     ///
     /// A wave of wave number k on the surface is damped by 1 / (1 + 4 k³ λ / density): λ is such that this is ½ for a
     /// wave number that is the inverse of a length.
-    fn from_measures(count: usize, density: f64, noise: f64) -> Self {
+    fn from_measures(count: usize, density: f64, noise: f64, has_walls: bool) -> Self {
+        let [shorter, less] = if has_walls { [LENGTH_OF_WALLS, SMOOTHNESS_OF_WALLS] } else { [1.0; 2] };
         let length = if count < SPARSE_POINTS {
             SPARSE_LENGTH
         } else {
-            LENGTH[0] / density.sqrt() + LENGTH[1] * noise
+            shorter * (LENGTH[0] / density.sqrt() + LENGTH[1] * noise)
         };
         let lambda_surface = length * length * length * density / 4.0;
         let bounded = |value: f64, most: f64| if value < most { value } else { most };
@@ -89,7 +102,7 @@ impl Choice {
             density,
             lambda_surface: lambda_surface / crowding(count),
             lambda_exterior: bounded(SOFTNESS[0] * lambda_surface, SOFTNESS[1]),
-            delta: bounded(SMOOTHNESS[0] * density.sqrt(), SMOOTHNESS[1]),
+            delta: less * bounded(SMOOTHNESS[0] * density.sqrt(), SMOOTHNESS[1]),
             sides: None,
         }
     }
