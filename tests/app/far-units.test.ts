@@ -192,7 +192,7 @@ describe('coordinates as text', () => {
     const clicked = add(FAR, [0.000123456, 0.25, -0.25]);
     const cloud = {
       ...{ example: undefined, file: 'survey.xyz', choice: { maxPoints: undefined, keepComponents: undefined } },
-      ...{ params: {}, defaults: {}, size: 17, color: 'plain', photo: undefined },
+      ...{ params: {}, defaults: {}, size: 17, color: 'plain' as const, photo: undefined },
     };
     const edits = { added: [clicked], removed: [3], outside: [FAR] };
     const read = cloudLink.fromHash(cloudLink.toHash(cloudLink.linkOf({ ...cloud, edits })));

@@ -592,12 +592,17 @@ describe('a link', () => {
     expect(await measured()).toMatchObject({ components: 1, genus: 0 });
   });
 
+  test('with settings that are unknown, or cannot be read, say which, and apply the others', async () => {
+    await openAt('#reconstruct?example=two-balls&keepComponents=1.5&colour=red&p.tau=0.03', 'done');
+    expect(await text('.banner')).toMatch(/left out.*keepComponents=1\.5, colour=red\. All others apply/);
+    expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls&p.tau=0.03');
+  });
+
   for (const [settings, why, options] of [
     ['p.delta=-1', 'delta', {}],
     ['p.kernel=cubic', 'kernel', LONG],
     ['p.nonsense=3', 'nonsense', LONG],
     ['maxPoints=2', 'maxPoints', LONG],
-    ['keepComponents=1.5', 'keepComponents', LONG],
     ['add=1e30,0,0', 'added', LONG],
     ['outside=0,0,1e30', 'exterior', LONG],
   ] as const) {
@@ -623,12 +628,22 @@ describe('a link', () => {
   });
 
   test('that removes missing points, or one twice, removes the existing ones', LONG, async () => {
-    await openAt('#reconstruct?example=two-balls&remove=1,1,999999,-4,x', 'done');
+    await openAt('#reconstruct?example=two-balls&remove=1,1,999999', 'done');
     expect(await text('.edit-tools [role=status]')).toBe('1 point removed.');
     expect((await measured()).surfaceConstraints).toBe(1599);
   });
 
-  test.each(['maxPoints=abc', 'add=1,2', 'photo=99', '&&', '%E0%A4%A'])('ignores %s', LONG, async (nonsense) => {
+  test.each(['maxPoints=abc', 'add=1,2', 'remove=1,-4', '%E0%A4%A'])(
+    'leaves out %s, and says so',
+    LONG,
+    async (one) => {
+      await openAt(`#reconstruct?example=two-balls&${one}`, 'done');
+      expect(await text('.banner')).toContain('Some of the link’s settings were left out.');
+      expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');
+    },
+  );
+
+  test.each(['photo=99', '&&'])('ignores %s', LONG, async (nonsense) => {
     await openAt(`#reconstruct?example=two-balls&${nonsense}`, 'done');
     expect(await app.page.locator('.banner').isVisible()).toBe(false);
     expect(await app.page.evaluate(() => location.hash)).toBe('#reconstruct?example=two-balls');

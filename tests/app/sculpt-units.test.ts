@@ -119,7 +119,13 @@ describe('fitted ellipsoids', () => {
 
 describe('links', () => {
   const settings = {
-    ...{ file: '', usual: { smoothing: 10 }, params: { smoothing: 10 }, color: 'plain', layout: 'result' },
+    ...{
+      file: '',
+      usual: { smoothing: 10 },
+      params: { smoothing: 10 },
+      color: 'plain' as const,
+      layout: 'result' as const,
+    },
     ...{ support: 'membrane' as const, start: [] },
   };
   const [bust] = SCENES;
@@ -146,11 +152,17 @@ describe('links', () => {
     expect(toHash(linkOf({ ...surface, pose: undefined }))).toBe('#sculpt?file=cow.obj&support=surface');
     const linked = fromHash(toHash(linkOf({ ...surface, pose: [moved(LONG, [1, 0, 0])] })));
     expect(linked).toMatchObject({ support: 'surface', rest: [LONG], pose: [moved(LONG, [1, 0, 0])] });
-    expect(fromHash('#sculpt?file=cow.obj&support=pillar')).toEqual({ params: {}, file: 'cow.obj' });
+    expect(fromHash('#sculpt?file=cow.obj&support=pillar')).toEqual({
+      ...{ params: {}, file: 'cow.obj' },
+      unread: ['support=pillar'],
+    });
   });
 
   test('with invalid parts are read as far as possible', () => {
-    expect(fromHash('#sculpt?pose=1,2;3&key=x&between=-4&layout=row')).toEqual({ params: {}, layout: 'row' });
+    expect(fromHash('#sculpt?pose=1,2;3&key=x&between=-4&layout=row')).toEqual({
+      ...{ params: {}, layout: 'row' },
+      unread: ['between=-4', 'pose=1,2;3', 'key=x'],
+    });
     expect(fromHash('#extract?example=bust')).toBeUndefined();
   });
 });

@@ -257,9 +257,10 @@ describe('links', () => {
     expect(linked?.view).toEqual({ below: 'time', edges: true, votes: 'all' });
   });
 
-  test('ignore invalid settings', () => {
-    const linked = fromHash('#track?box=1,2&at=x&binning=7&enrichment=magic&factor=-2&p.threshold=abc');
-    expect(linked).toEqual({ params: { threshold: 'abc' }, preparation: {}, view: {} });
+  test('name invalid settings', () => {
+    const invalid = ['binning=7', 'enrichment=magic', 'factor=-2', 'box=1,2', 'at=x', 'colour=red'];
+    const linked = fromHash(`#track?${invalid.join('&')}&p.threshold=abc`);
+    expect(linked).toEqual({ params: { threshold: 'abc' }, preparation: {}, view: {}, unread: invalid });
     expect(fromHash('#track?cavity=shut')?.cavity).toBeUndefined();
   });
 

@@ -231,12 +231,13 @@ describe('a link', () => {
     expect(toHash(linkOf({ ...plain, params: { ...first.params, damping: 0.4 } }))).toBe('#extract');
   });
 
-  test('of another lab, or with invalid parts, does no harm', () => {
+  test('of another lab, or with invalid parts, does no harm, and says which parts', () => {
     expect(fromHash('#track?example=tooth')).toBeUndefined();
     expect(fromHash('#extract')).toBeUndefined();
     expect(fromHash('#extract?levels=many&attractor=1,2&p.iso=&start=&v=2')).toEqual({
       params: { iso: '' },
       attractors: [],
+      unread: ['start=', 'levels=many', 'attractor=1,2'],
     });
   });
 });

@@ -215,7 +215,7 @@ function numberInput(spec: ParamSpec, onChange: (value: unknown) => void): Input
 /** Formats a number the way it is usually typed: 1e-6 rather than 0.000001. */
 function typed(value: number): string {
   const short = Number(value.toPrecision(6));
-  return short !== 0 && Math.abs(short) < 1e-3 ? short.toExponential() : String(short);
+  return short !== 0 && Math.abs(short) < 1e-4 ? short.toExponential() : String(short);
 }
 
 /**

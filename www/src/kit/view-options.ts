@@ -24,7 +24,7 @@ export const PLACEMENTS: Choice<SlicePlacement>[] = [
   { value: 'hidden', label: text('controls.placementHidden') },
 ];
 
-const COLOR_MODES: Choice<ColorMode>[] = [
+export const COLOR_MODES: Choice<ColorMode>[] = [
   { value: 'plain', label: text('controls.colorPlain') },
   { value: 'component', label: text('controls.colorComponent') },
   { value: 'speed', label: text('controls.colorSpeed') },

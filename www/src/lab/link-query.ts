@@ -8,7 +8,7 @@ import { count, text } from '../texts';
 /** Most characters of a link's settings. Browsers and other programs cut off longer addresses. */
 const MOST_CHARACTERS = 30_000;
 /** Most characters of a name. */
-const MOST_NAME = 200;
+export const MOST_NAME = 200;
 /** Most parameters. */
 const MOST_PARAMS = 200;
 
@@ -43,29 +43,6 @@ export function queryOf(hash: string, lab: string): URLSearchParams | undefined 
   return new URLSearchParams(settings);
 }
 
-/** Returns the texts of those names that a link has. */
-export function textsIn<Name extends string>(query: URLSearchParams, names: readonly Name[]): { [K in Name]?: string } {
-  const found: { [K in Name]?: string } = {};
-  for (const name of names) {
-    const value = query.get(name)?.slice(0, MOST_NAME);
-    if (value) found[name] = value;
-  }
-  return found;
-}
-
-/** Returns the finite numbers of those names that a link has. */
-export function numbersIn<Name extends string>(
-  query: URLSearchParams,
-  names: readonly Name[],
-): { [K in Name]?: number } {
-  const found: { [K in Name]?: number } = {};
-  for (const name of names) {
-    const value = Number(query.get(name) || Number.NaN);
-    if (Number.isFinite(value)) found[name] = value;
-  }
-  return found;
-}
-
 /** Returns the parameters in a link, whose names begin with `p.`; whether they are known is not checked here. */
 export function paramsIn(query: URLSearchParams, read = readValue): ParamValues {
   const entries = [...query].filter(([name]) => name.startsWith('p.'));
@@ -86,11 +63,6 @@ export function allIn(query: URLSearchParams, name: string, most: number): strin
   const found = query.getAll(name);
   if (found.length > most) throw tooMany(name, most, found.length);
   return found;
-}
-
-/** Returns lists of `length` numbers of a name, of which there are at most `most`; others are left out. */
-export function listsIn(query: URLSearchParams, name: string, length: number, most: number): number[][] {
-  return allIn(query, name, most).flatMap((text) => [listOf(text, length) ?? []].filter((list) => list.length > 0));
 }
 
 /** Returns the numbers in a text with commas; undefined if they are not `length` finite ones. */

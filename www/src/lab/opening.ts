@@ -11,6 +11,10 @@ import type { LabStates } from './states';
 /** Milliseconds that a busy worker has to save its model before it is terminated. */
 const SAVE_TIMEOUT_MS = 300;
 
+/** Most settings of a link that are named where they cannot be read, and most characters of each. */
+const MOST_NAMED = 4;
+const MOST_SHOWN = 40;
+
 /** Voxels beyond which what is open gives back its memory before other data are read. */
 const HEAVY = 2 ** 22;
 
@@ -85,6 +89,15 @@ export interface Loading<Example, Linked, Data> {
   present: Source<Example, Linked, Data> | undefined;
 }
 
+/** What a link says about the data, whatever the lab. */
+interface LinkedData {
+  example?: string;
+  /** Name of the user's file. */
+  file?: string;
+  /** What the link has that cannot be read. */
+  unread?: string[];
+}
+
 /** The data of a lab: which there are, and how its worker builds a model of them. */
 export interface LabData<Example, Linked, Data, Opened> {
   /** The example that opens by default. */
@@ -151,7 +164,7 @@ export interface LabData<Example, Linked, Data, Opened> {
  * Opens examples, files and links: gets the data and has the worker build a model of it. The newest request wins; when
  * it fails, everything stays as before.
  */
-export class Opening<Example, Linked extends { example?: string; file?: string }, Data, Opened> {
+export class Opening<Example, Linked extends LinkedData, Data, Opened> {
   readonly #engine: Engine;
   readonly #ui: OpeningParts<Example>;
   readonly #states: LabStates;
@@ -251,9 +264,9 @@ export class Opening<Example, Linked extends { example?: string; file?: string }
     this.#requestCount += 1;
   }
 
-  /** Opens an example, with the settings in a link, if given. */
-  example(example: Example, linked?: Linked): Promise<void> {
-    return this.open({ ...this.#lab.fromExample(example), ...(linked && { linked }) });
+  /** Opens an example. */
+  example(example: Example): Promise<void> {
+    return this.open(this.#lab.fromExample(example));
   }
 
   /**
@@ -264,7 +277,7 @@ export class Opening<Example, Linked extends { example?: string; file?: string }
     const source = this.#lab.fromFiles(files);
     const waiting = this.#awaiting;
     const linked = waiting?.file === source.name ? waiting : undefined;
-    await this.open({ ...source, ...(linked && { linked }) });
+    await this.#openLinked({ ...source, ...(linked && { linked }) });
     if (!waiting || linked || this.#source?.name !== source.name || this.#ui.banner.shown) return;
     this.#ui.banner.show(
       text('labs.linkOtherFile', { name: source.name }),
@@ -336,13 +349,28 @@ export class Opening<Example, Linked extends { example?: string; file?: string }
       return this.#ui.banner.show(text('labs.linkInvalid'), linked.message);
     }
     const example = linked && this.#exampleOf(linked);
-    if (linked && example) return this.example(example, linked);
+    if (linked && example) return this.#openLinked({ ...this.#lab.fromExample(example), linked });
     if (otherwise) await this.example(otherwise);
     if (!linked) return;
     this.#awaiting = linked.file ? linked : undefined;
     if (linked.file)
       this.#ui.banner.show(text('labs.linkNeedsFile'), text('labs.linkNeedsFileHint', { file: linked.file }));
     else this.#ui.banner.show(text('labs.linkInvalid'), text('labs.linkNoExample', { example: linked.example ?? '' }));
+  }
+
+  /** Opens a source, and says what cannot be read of the link whose other settings are in force then. */
+  async #openLinked(source: Source<Example, Linked, Data>): Promise<void> {
+    const unread = source.linked?.unread ?? [];
+    const opening = this.open(source);
+    const own = this.#requestCount;
+    await opening;
+    if (unread.length === 0 || own !== this.#requestCount || this.#states.value === 'error') return;
+    const settings = unread.slice(0, MOST_NAMED).map(shortened).join(', ');
+    const more = unread.length - MOST_NAMED;
+    this.#ui.banner.show(
+      text('labs.linkUnread'),
+      more > 0 ? text('labs.linkUnreadMore', { settings, more }) : text('labs.linkUnreadHint', { settings }),
+    );
   }
 
   #exampleOf({ example, file }: Linked): Example | undefined {
@@ -485,5 +513,7 @@ export class Opening<Example, Linked extends { example?: string; file?: string }
 /** Returns what the banner says when a source cannot be opened. */
 const titleOf = ({ name, session }: Pick<Source<never, never, never>, 'name' | 'session'>): string =>
   text(session ? 'sessions.openFailed' : 'labs.openFailed', { name });
+
+const shortened = (setting: string) => (setting.length > MOST_SHOWN ? `${setting.slice(0, MOST_SHOWN)}…` : setting);
 
 const later = (milliseconds: number) => new Promise((resolve) => setTimeout(resolve, milliseconds));

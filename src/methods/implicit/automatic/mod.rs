@@ -33,7 +33,7 @@ const LENGTH: [f64; 2] = [0.25, 0.95];
 /// difference of the two in distances between points: beside edges it is less.
 const ACROSS_WALLS: f64 = 1.5;
 const LEAST_ACROSS: f64 = 0.2;
-/// What the length and δ are multiplied by then: else the sides of a wall are drawn together.
+/// Factors of the length and of δ then: with more, both sides of a wall are pulled into it.
 const LENGTH_OF_WALLS: f64 = 0.9;
 const SMOOTHNESS_OF_WALLS: f64 = 0.5;
 /// λ of constraints off the surface, relative to that of those on it, and the largest. They are soft, so that wrong ones

@@ -1,10 +1,11 @@
 /** Converts the Extract lab's settings to the hash of an address, `#extract?…`, and back. */
 
 import type { Attractor, ParamValues, Vec3 } from '../../engine/protocol';
-import type { ColorMode } from '../../kit/view-options';
-import { differing, listsIn, numbersIn, paramsIn, queryOf, textsIn } from '../../lab/link-query';
+import { COLOR_MODES, type ColorMode } from '../../kit/view-options';
+import { as, integer, linkFormat, many, name, numbers, oneOfChoices, real } from '../../lab/link-fields';
+import { differing } from '../../lab/link-query';
 import { EXAMPLES, type Example } from './examples';
-import { isStartKind, type StartChoice } from './panels/start';
+import { SHAPES, type StartChoice } from './panels/start';
 import { defaultStart, exampleById, isPreset, PAPER } from './presets';
 
 export const ADDRESS = '#extract';
@@ -26,7 +27,7 @@ export interface Linked {
   example?: string;
   /** Name of the user's file, if one is open; the link does not contain the file itself. */
   file?: string;
-  start?: string;
+  start?: StartChoice['kind'];
   bubbles?: number;
   sphere?: { center: Vec3; radius: number };
   levels?: number;
@@ -37,7 +38,25 @@ export interface Linked {
   params: ParamValues;
   attractors: Attractor[];
   color?: ColorMode;
+  unread?: string[];
 }
+
+const sphere = as(
+  numbers(4),
+  ([x = 0, y = 0, z = 0, radius = 1]): Linked['sphere'] => ({ center: [x, y, z], radius }),
+  ({ center, radius }) => [...center, radius],
+);
+const attractor = as(
+  numbers(5),
+  ([x = 0, y = 0, z = 0, strength = 0, radius = 1]): Attractor => ({ point: [x, y, z], strength, radius }),
+  ({ point, strength, radius }) => [...point, strength, radius],
+);
+
+const FORMAT = linkFormat(ADDRESS, {
+  ...{ example: name, file: name, frame: integer(0), start: oneOfChoices(SHAPES), bubbles: real(), sphere },
+  ...{ levels: integer(0), edge: real(), color: oneOfChoices(COLOR_MODES) },
+  ...{ attractor: many(attractor, MOST_ATTRACTORS), v: name },
+});
 
 /** Present settings of the Extract lab, from which a link is made. */
 export interface LabSettings {
@@ -83,7 +102,7 @@ export function linkOf(settings: LabSettings): Linked {
 /** Returns `choice`, the choice of the initial surface, with the settings that a link contains in place of its own. */
 export function withLink(choice: StartChoice, { start, bubbles, levels, edge }: Linked): StartChoice {
   return {
-    kind: isStartKind(start) ? start : choice.kind,
+    kind: start ?? choice.kind,
     bubbles: bubbles ?? choice.bubbles,
     levels: levels ?? choice.levels,
     edge: edge === undefined ? choice.edge : edge || undefined,
@@ -91,41 +110,19 @@ export function withLink(choice: StartChoice, { start, bubbles, levels, edge }: 
 }
 
 /** Converts the settings in a link to the hash of an address, with all digits, which give the same surface to the bit. */
-export function toHash(linked: Linked): string {
-  const query = new URLSearchParams();
-  const { example, file, frame, start, bubbles, sphere, levels, edge, params, attractors, color } = linked;
-  for (const [name, value] of Object.entries({ example, file, frame, start, bubbles, levels, edge, color }))
-    if (value !== undefined) query.set(name, String(value));
-  if (sphere) query.set('sphere', [...sphere.center, sphere.radius].join(','));
-  for (const [name, value] of Object.entries(params)) query.set(`p.${name}`, String(value));
-  for (const { point, strength, radius } of attractors)
-    query.append('attractor', [...point, strength, radius].join(','));
-  if (query.size > 0) query.set('v', VERSION);
-  const text = query.toString().replaceAll('%2C', ',');
-  return text ? `${ADDRESS}?${text}` : ADDRESS;
+export function toHash({ attractors, ...settings }: Linked): string {
+  const given = { ...settings, attractor: attractors };
+  const hash = FORMAT.toHash(given);
+  return hash === ADDRESS ? hash : FORMAT.toHash({ ...given, v: VERSION });
 }
 
-/**
- * Parses the hash of an address; undefined if it is for another lab or contains no settings. Settings that cannot be
- * parsed are ignored; whether names and values are valid is not checked here.
- */
+/** Parses the hash of an address; undefined if it is for another lab or contains no settings. */
 export function fromHash(hash: string): Linked | undefined {
-  const query = queryOf(hash, ADDRESS);
-  if (!query) return undefined;
-  const [sphere] = listsIn(query, 'sphere', 4, 1);
-  const attractors = listsIn(query, 'attractor', 5, MOST_ATTRACTORS);
-  const { color, ...names } = textsIn(query, ['example', 'file', 'start', 'color']);
-  const linked: Linked = {
-    ...names,
-    ...numbersIn(query, ['frame', 'bubbles', 'levels', 'edge']),
-    ...(sphere && { sphere: { center: sphere.slice(0, 3) as Vec3, radius: sphere[3] ?? 1 } }),
-    params: paramsIn(query),
-    attractors: attractors.map(([x = 0, y = 0, z = 0, strength = 0, radius = 1]) => {
-      return { point: [x, y, z], strength, radius };
-    }),
-    ...(color && { color: color as ColorMode }),
-  };
-  return query.has('v') ? linked : asBefore(linked);
+  const found = FORMAT.fromHash(hash);
+  if (!found) return undefined;
+  const { v, attractor: attractors = [], ...settings } = found;
+  const linked = { ...settings, attractors };
+  return v === undefined ? asBefore(linked) : linked;
 }
 
 /**

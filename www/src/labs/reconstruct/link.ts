@@ -1,9 +1,12 @@
 /** Converts the Reconstruct lab's settings to the hash of an address, `#reconstruct?…`, and back. */
 import { shortenedPoint } from '../../engine/placing';
 import type { ParamValues, Vec3 } from '../../engine/protocol';
-import { differing, listsIn, numbersIn, paramsIn, queryOf, textsIn } from '../../lab/link-query';
+import { as, type Field, integer, linkFormat, many, name, numbers, oneOfChoices } from '../../lab/link-fields';
+import { differing } from '../../lab/link-query';
+import type { SurfaceColor } from '../../scene/surface';
 import { withPaper } from './before';
 import { CLOUDS, type CloudExample } from './examples';
+import { CLOUD_COLORS } from './panels/cloud-options';
 import type { CloudChoice } from './panels/cloud-setup';
 import { isCloudPreset } from './presets';
 import type { Edits } from './protocol';
@@ -30,10 +33,33 @@ export interface LinkedCloud extends Partial<CloudChoice> {
   file?: string;
   params: ParamValues;
   edits: Edits;
-  color?: string;
+  color?: SurfaceColor;
   /** Number of the photograph whose camera the view uses, from 1; 0 for none. */
   photo?: number;
+  unread?: string[];
 }
+
+const point = as(
+  numbers(3),
+  ([x = 0, y = 0, z = 0]): Vec3 => [x, y, z],
+  (one) => one,
+);
+
+/** Indices of points, each once. */
+const indices: Field<number[]> = {
+  read: (text) => {
+    const all = text.split(',', MOST_EDITS + 1).map(Number);
+    const isRead = text !== '' && all.length <= MOST_EDITS && all.every((one) => Number.isInteger(one) && one >= 0);
+    return isRead ? [...new Set(all)] : undefined;
+  },
+  write: (all) => all.join(','),
+};
+
+const FORMAT = linkFormat(ADDRESS, {
+  ...{ example: name, file: name, maxPoints: integer(0), keepComponents: integer(0) },
+  ...{ color: oneOfChoices(CLOUD_COLORS), photo: integer(0) },
+  ...{ add: many(point, MOST_EDITS), outside: many(point, MOST_EDITS), remove: indices, v: name },
+});
 
 /** Present settings of the Reconstruct lab, from which a link is made. */
 export interface CloudSettings {
@@ -45,7 +71,7 @@ export interface CloudSettings {
   edits: Edits;
   /** Size of the points, to which coordinates are rounded. */
   size: number;
-  color: string;
+  color: SurfaceColor;
   photo: number | undefined;
 }
 
@@ -103,40 +129,22 @@ export function withLink(choice: CloudChoice, { maxPoints, keepComponents }: Par
 }
 
 /** Converts the settings in a link to the hash of an address. */
-export function toHash(linked: LinkedCloud): string {
-  const query = new URLSearchParams();
-  for (const name of ['example', 'file', 'maxPoints', 'keepComponents', 'color', 'photo'] as const) {
-    const value = linked[name];
-    if (value !== undefined) query.set(name, String(value));
-  }
-  for (const [name, value] of Object.entries(linked.params)) query.set(`p.${name}`, String(value));
-  for (const point of linked.edits.added) query.append('add', point.join(','));
-  for (const point of linked.edits.outside) query.append('outside', point.join(','));
-  if (linked.edits.removed.length > 0) query.set('remove', linked.edits.removed.join(','));
-  if (linked.file !== undefined && linked.example === undefined) query.set('v', VERSION);
-  const text = query.toString().replaceAll('%2C', ',');
-  return text ? `${ADDRESS}?${text}` : ADDRESS;
+export function toHash({ edits, ...settings }: LinkedCloud): string {
+  const { added: add, outside, removed } = edits;
+  const version = settings.file !== undefined && settings.example === undefined;
+  return FORMAT.toHash({
+    ...{ ...settings, add, outside },
+    ...(removed.length > 0 && { remove: removed }),
+    ...(version && { v: VERSION }),
+  });
 }
 
-/**
- * Parses the hash of an address; undefined if it is for another lab or contains no settings. Settings that cannot be
- * parsed are ignored; whether names and values are valid is not checked here.
- */
+/** Parses the hash of an address; undefined if it is for another lab or contains no settings. */
 export function fromHash(hash: string): LinkedCloud | undefined {
-  const query = queryOf(hash, ADDRESS);
-  if (!query) return undefined;
-  const removed = (query.get('remove') ?? '').split(',', MOST_EDITS).filter(Boolean).map(Number);
-  const pointsIn = (name: string) => listsIn(query, name, 3, MOST_EDITS) as Vec3[];
-  const edits = {
-    added: pointsIn('add'),
-    outside: pointsIn('outside'),
-    removed: [...new Set(removed)].filter((index) => Number.isInteger(index) && index >= 0),
-  };
-  const linked: LinkedCloud = {
-    ...textsIn(query, ['example', 'file', 'color']),
-    ...numbersIn(query, ['maxPoints', 'keepComponents', 'photo']),
-    params: paramsIn(query),
-    edits,
-  };
-  return query.has('v') || linked.file === undefined || linked.example !== undefined ? linked : withPaper(linked);
+  const found = FORMAT.fromHash(hash);
+  if (!found) return undefined;
+  const { v, add: added = [], outside = [], remove: removed = [], ...settings } = found;
+  const linked = { ...settings, edits: { added, outside, removed } };
+  const isBefore = v === undefined && linked.file !== undefined && linked.example === undefined;
+  return isBefore ? withPaper(linked) : linked;
 }

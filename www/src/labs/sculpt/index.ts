@@ -141,8 +141,8 @@ class SculptLab implements RunningLab<SculptExample> {
       film,
       params,
     });
-    const color = (linked?.color ?? example?.color ?? 'plain') as SculptViewOptions['color'];
-    const layout = (linked?.layout ?? example?.layout ?? 'result') as SculptViewOptions['layout'];
+    const color = linked?.color ?? example?.color ?? 'plain';
+    const layout = linked?.layout ?? example?.layout ?? 'result';
     const preset = isSculptPreset(example) ? example : undefined;
     offerStages(this.ui.options, preset?.stages !== undefined);
     this.ui.options.set({

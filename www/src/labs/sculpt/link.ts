@@ -1,10 +1,13 @@
 /** Converts the Sculpt lab's settings to the hash of an address, `#sculpt?…`, and back. */
 import type { ParamValues } from '../../engine/protocol';
-import { allIn, differing, paramsIn, queryOf, textsIn } from '../../lab/link-query';
+import { type Field, flag, integer, linkFormat, many, name, oneOf, oneOfChoices } from '../../lab/link-fields';
+import { differing } from '../../lab/link-query';
+import type { SurfaceColor } from '../../scene/surface';
 import { fromNumbers, lengthsOf, toNumbers } from './ellipsoids';
 import { SCENES, type SculptExample } from './examples';
 import type { Film } from './film';
-import type { Pose, Support } from './protocol';
+import { LAYOUTS, SCULPT_COLORS } from './panels/options';
+import type { Layout, Pose, Support } from './protocol';
 
 const ADDRESS = '#sculpt';
 /** Most keyframes that a link includes: some programs truncate long addresses. */
@@ -33,14 +36,21 @@ export interface LinkedScene {
   rest?: Pose;
   /** Target pose of the ellipsoids, if it was set by hand. */
   pose?: Pose;
-  names?: string[];
   /** Keyframes of the user's own film; without them, `loop` applies to the example's film. */
   keys?: Pose[];
   between?: number;
   loop?: boolean;
-  color?: string;
-  layout?: string;
+  color?: SurfaceColor;
+  layout?: Layout;
+  unread?: string[];
 }
+
+const pose: Field<Pose> = { read: asPose, write: asText };
+
+const FORMAT = linkFormat(ADDRESS, {
+  ...{ example: name, file: name, support: oneOf(['surface', 'membrane']), color: oneOfChoices(SCULPT_COLORS) },
+  ...{ layout: oneOfChoices(LAYOUTS), between: integer(1), loop: flag, rest: pose, pose, key: many(pose, MOST_KEYS) },
+});
 
 /** Present settings of the Sculpt lab, from which a link is made. */
 export interface SceneSettings {
@@ -54,8 +64,8 @@ export interface SceneSettings {
   start: Pose;
   pose: Pose | undefined;
   film: Film | undefined;
-  color: string;
-  layout: string;
+  color: SurfaceColor;
+  layout: Layout;
 }
 
 /**
@@ -121,41 +131,12 @@ function asPose(text: string): Pose | undefined {
 }
 
 /** Converts the settings in a link to the hash of an address. */
-export function toHash(linked: LinkedScene): string {
-  const query = new URLSearchParams();
-  for (const name of ['example', 'file', 'support', 'color', 'layout', 'between', 'loop'] as const) {
-    const value = linked[name];
-    if (value !== undefined) query.set(name, String(value));
-  }
-  for (const [name, value] of Object.entries(linked.params)) query.set(`p.${name}`, String(value));
-  if (linked.rest) query.set('rest', asText(linked.rest));
-  if (linked.pose) query.set('pose', asText(linked.pose));
-  for (const key of linked.keys ?? []) query.append('key', asText(key));
-  const text = query.toString().replaceAll('%2C', ',').replaceAll('%3B', ';');
-  return text ? `${ADDRESS}?${text}` : ADDRESS;
-}
+export const toHash = ({ keys = [], ...settings }: LinkedScene): string => FORMAT.toHash({ ...settings, key: keys });
 
-/**
- * Parses the hash of an address; undefined if it is for another lab or contains no settings. Settings that cannot be
- * parsed are ignored; whether names and values are valid is not checked here.
- */
+/** Parses the hash of an address; undefined if it is for another lab or contains no settings. */
 export function fromHash(hash: string): LinkedScene | undefined {
-  const query = queryOf(hash, ADDRESS);
-  if (!query) return undefined;
-  const linked: LinkedScene = {
-    ...textsIn(query, ['example', 'file', 'color', 'layout']),
-    params: paramsIn(query),
-  };
-  const between = Number(query.get('between') ?? Number.NaN);
-  if (Number.isInteger(between) && between > 0) linked.between = between;
-  if (query.has('loop')) linked.loop = query.get('loop') === 'true';
-  const support = query.get('support');
-  if (support === 'surface' || support === 'membrane') linked.support = support;
-  for (const name of ['rest', 'pose'] as const) {
-    const pose = asPose(query.get(name) ?? '');
-    if (pose) linked[name] = pose;
-  }
-  const keys = allIn(query, 'key', MOST_KEYS).flatMap((key) => [asPose(key) ?? []].filter(({ length }) => length > 0));
-  if (keys.length > 0) linked.keys = keys;
-  return linked;
+  const found = FORMAT.fromHash(hash);
+  if (!found) return undefined;
+  const { key: keys, ...settings } = found;
+  return { ...settings, ...(keys && { keys }) };
 }

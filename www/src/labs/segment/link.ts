@@ -1,6 +1,8 @@
 /** Converts the Segment lab's settings to the hash of an address, `#segment?…`, and back. */
 import type { ParamValues } from '../../engine/protocol';
-import { differing, numbersIn, paramsIn, queryOf, textsIn } from '../../lab/link-query';
+import { PLACEMENTS } from '../../kit/view-options';
+import { among, flag, linkFormat, name, oneOfChoices, real } from '../../lab/link-fields';
+import { differing } from '../../lab/link-query';
 import { SEGMENT_EXAMPLES, type SegmentExample } from './examples';
 import type { SegmentViewOptions } from './scene';
 
@@ -15,7 +17,11 @@ export interface LinkedSegment {
   file?: string;
   params: ParamValues;
   view: Partial<SegmentViewOptions>;
+  unread?: string[];
 }
+
+const VIEW = { edges: flag, outlines: flag, slices: oneOfChoices(PLACEMENTS), opacity: real() };
+const FORMAT = linkFormat(ADDRESS, { example: name, file: name, ...VIEW });
 
 /** Present settings of the Segment lab, from which a link is made. */
 export interface LinkableSegment {
@@ -38,30 +44,14 @@ export function linkOf({ example, file, params, defaults, view }: LinkableSegmen
 }
 
 /** Converts the settings in a link to the hash of an address. */
-export function toHash({ example, file, params, view }: LinkedSegment): string {
-  const query = new URLSearchParams();
-  for (const [name, value] of Object.entries({ example, file, ...view }))
-    if (value !== undefined) query.set(name, String(value));
-  for (const [name, value] of Object.entries(params)) query.set(`p.${name}`, String(value));
-  const text = query.toString();
-  return text ? `${ADDRESS}?${text}` : ADDRESS;
-}
+export const toHash = ({ view, ...settings }: LinkedSegment): string => FORMAT.toHash({ ...settings, ...view });
 
-/**
- * Parses the hash of an address; undefined if it is for another lab or contains no settings. Settings that cannot be
- * parsed are ignored; whether parameters and view options are valid is not checked here.
- */
+/** Parses the hash of an address; undefined if it is for another lab or contains no settings. */
 export function fromHash(hash: string): LinkedSegment | undefined {
-  const query = queryOf(hash, ADDRESS);
-  return query && { ...textsIn(query, ['example', 'file']), params: paramsIn(query), view: viewIn(query) };
-}
-
-function viewIn(query: URLSearchParams): Partial<SegmentViewOptions> {
-  const view: Partial<SegmentViewOptions> = {};
-  const { slices } = textsIn(query, ['slices']);
-  const { opacity } = numbersIn(query, ['opacity']);
-  for (const name of ['edges', 'outlines'] as const) if (query.has(name)) view[name] = query.get(name) === 'true';
-  if (slices) view.slices = slices as SegmentViewOptions['slices'];
-  if (opacity !== undefined) view.opacity = opacity;
-  return view;
+  const found = FORMAT.fromHash(hash);
+  if (!found) return undefined;
+  return {
+    ...among(found, ['example', 'file', 'params', 'unread']),
+    view: among(found, ['edges', 'outlines', 'slices', 'opacity']),
+  };
 }

@@ -1,9 +1,23 @@
 /** Converts the Track lab's settings to the hash of an address, `#track?…`, and back. */
 import type { ParamValues, Vec3 } from '../../engine/protocol';
-import { differing, listOf, paramsIn, queryOf, readValue, textsIn } from '../../lab/link-query';
+import { PLACEMENTS } from '../../kit/view-options';
+import {
+  among,
+  as,
+  type Field,
+  flag,
+  integer,
+  linkFormat,
+  name,
+  numbers,
+  oneOf,
+  oneOfChoices,
+} from '../../lab/link-fields';
+import { differing, readValue } from '../../lab/link-query';
 import { IMAGES, OWN_PREPARATION, type TrackExample } from './examples';
+import { BELOW, VOTES } from './panels/options';
 import { viewOf } from './presets';
-import type { Box, Cavity, Enrichment, Preparation, Setup } from './protocol';
+import type { Box, Cavity, Preparation, Setup } from './protocol';
 import type { TrackViewOptions } from './scene';
 
 const ADDRESS = '#track';
@@ -19,7 +33,44 @@ export interface LinkedTrack {
   at?: Vec3 | 'largest';
   cavity?: Cavity;
   view: Partial<TrackViewOptions>;
+  unread?: string[];
 }
+
+/** A word, or else what another field has. */
+const orWord = <const Word extends string, T>(word: Word, field: Field<T>): Field<Word | T> => ({
+  read: (text) => (text === word ? word : field.read(text)),
+  write: (value) => (value === word ? word : field.write(value as T)),
+});
+
+const box = as(
+  numbers(6),
+  (ends): Box => ({ min: ends.slice(0, 3) as Vec3, max: ends.slice(3) as Vec3 }),
+  ({ min, max }) => [...min, ...max],
+);
+const point = as(
+  numbers(3),
+  ([x = 0, y = 0, z = 0]): Vec3 => [x, y, z],
+  (one) => one,
+);
+const binning = as(
+  oneOf(['1', '2']),
+  (text) => Number(text) as Preparation['binning'],
+  (value) => (value === 1 ? '1' : '2'),
+);
+
+const PREPARATION = { binning, enrichment: oneOf(['none', 'linear', 'flow']), factor: integer(0) };
+const VIEW = {
+  ...{ surface: flag, edges: flag, region: flag, votes: oneOfChoices(VOTES) },
+  ...{ slices: oneOfChoices(PLACEMENTS), below: oneOfChoices(BELOW) },
+};
+const FORMAT = linkFormat(
+  ADDRESS,
+  {
+    ...{ example: name, file: name, ...PREPARATION, ...VIEW },
+    ...{ box: orWord('whole', box), at: orWord('largest', point), cavity: oneOf(['closed', 'open']) },
+  },
+  paramOf,
+);
 
 /** Present settings of the Track lab, from which a link is made. */
 export interface LinkableTrack {
@@ -30,9 +81,6 @@ export interface LinkableTrack {
   /** Whether the lab asks for the object, so that the region and the surface are not chosen yet. */
   asks?: boolean;
 }
-
-const SWITCHES = ['surface', 'edges', 'region'] as const;
-const ENRICHMENTS: readonly string[] = ['none', 'linear', 'flow'] satisfies Enrichment[];
 
 /**
  * Returns the setup of the tracker that an example, or else the user's own image, opens with, changed by the settings
@@ -76,60 +124,20 @@ export function isChosen({ box, at }: Pick<LinkedTrack, 'box' | 'at'> | Setup): 
 }
 
 /** Converts the settings in a link to the hash of an address, with all digits, which give the same surfaces to the bit. */
-export function toHash({ example, file, params, preparation, box, at, cavity, view }: LinkedTrack): string {
-  const query = new URLSearchParams();
-  for (const [name, value] of Object.entries({ example, file, ...preparation, ...view }))
-    if (value !== undefined) query.set(name, String(value));
-  if (box) query.set('box', box === 'whole' ? box : [...box.min, ...box.max].join(','));
-  if (at) query.set('at', at === 'largest' ? at : at.join(','));
-  if (cavity) query.set('cavity', cavity);
-  for (const [name, value] of Object.entries(params)) query.set(`p.${name}`, String(value));
-  const text = query.toString().replaceAll('%2C', ',');
-  return text ? `${ADDRESS}?${text}` : ADDRESS;
-}
+export const toHash = ({ preparation, view, ...settings }: LinkedTrack): string =>
+  FORMAT.toHash({ ...settings, ...preparation, ...view });
 
-/**
- * Parses the hash of an address; undefined if it is for another lab or contains no settings. Settings that cannot be
- * parsed are ignored; whether parameters and view options are valid is not checked here.
- */
+/** Parses the hash of an address; undefined if it is for another lab or contains no settings. */
 export function fromHash(hash: string): LinkedTrack | undefined {
-  const query = queryOf(hash, ADDRESS);
-  if (!query) return undefined;
-  const linked: LinkedTrack = {
-    ...textsIn(query, ['example', 'file']),
-    params: paramsIn(query, paramOf),
-    preparation: preparationOf(query),
-    view: viewIn(query),
+  const found = FORMAT.fromHash(hash);
+  if (!found) return undefined;
+  return {
+    ...among(found, ['example', 'file', 'params', 'box', 'at', 'cavity', 'unread']),
+    preparation: among(found, ['binning', 'enrichment', 'factor']),
+    view: among(found, ['surface', 'edges', 'region', 'votes', 'slices', 'below']),
   };
-  const [box, at] = [listOf(query.get('box') ?? '', 6), listOf(query.get('at') ?? '', 3)];
-  if (box) linked.box = { min: box.slice(0, 3) as Vec3, max: box.slice(3) as Vec3 };
-  else if (query.get('box') === 'whole') linked.box = 'whole';
-  if (at) linked.at = at as Vec3;
-  else if (query.get('at') === 'largest') linked.at = 'largest';
-  if (query.get('cavity') === 'closed') linked.cavity = 'closed';
-  return linked;
 }
 
 function paramOf(text: string): unknown {
-  return text === 'true' ? true : text === 'false' ? false : readValue(text);
-}
-
-function preparationOf(query: URLSearchParams): Partial<Preparation> {
-  const [binning, factor] = [Number(query.get('binning')), Number(query.get('factor') ?? Number.NaN)];
-  const enrichment = query.get('enrichment') ?? '';
-  return {
-    ...((binning === 1 || binning === 2) && { binning }),
-    ...(ENRICHMENTS.includes(enrichment) && { enrichment: enrichment as Enrichment }),
-    ...(Number.isInteger(factor) && factor >= 0 && { factor }),
-  };
-}
-
-function viewIn(query: URLSearchParams): Partial<TrackViewOptions> {
-  const view: Partial<TrackViewOptions> = {};
-  for (const name of SWITCHES) if (query.has(name)) view[name] = query.get(name) === 'true';
-  const { votes, slices, below } = textsIn(query, ['votes', 'slices', 'below']);
-  if (votes) view.votes = votes as TrackViewOptions['votes'];
-  if (slices) view.slices = slices as TrackViewOptions['slices'];
-  if (below) view.below = below as TrackViewOptions['below'];
-  return view;
+  return flag.read(text) ?? readValue(text);
 }

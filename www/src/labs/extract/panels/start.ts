@@ -5,11 +5,7 @@ import type { StartShape } from '../protocol';
 
 type Kind = StartShape['kind'];
 
-export function isStartKind(text: string | undefined): text is Kind {
-  return SHAPES.some(({ value }) => value === text);
-}
-
-const SHAPES: { value: Kind; label: string; help: string }[] = [
+export const SHAPES: { value: Kind; label: string; help: string }[] = [
   {
     value: 'contour',
     label: text('extractPanels.startContour'),

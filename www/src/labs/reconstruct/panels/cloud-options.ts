@@ -5,7 +5,7 @@ import type { SurfaceColor } from '../../../scene/surface';
 import { text } from '../../../texts';
 import type { CloudViewOptions } from '../scene';
 
-const CLOUD_COLORS: Choice<SurfaceColor>[] = [
+export const CLOUD_COLORS: Choice<SurfaceColor>[] = [
   { value: 'own', label: text('pointPanels.colorOwn') },
   { value: 'plain', label: text('controls.colorPlain') },
   { value: 'component', label: text('controls.colorComponent') },

@@ -5,7 +5,7 @@ import { text } from '../../../texts';
 import type { Layout } from '../protocol';
 import type { SculptViewOptions } from '../scene';
 
-const LAYOUTS: Choice<Layout>[] = [
+export const LAYOUTS: Choice<Layout>[] = [
   { value: 'result', label: text('sculptPanels.layoutResult') },
   { value: 'base', label: text('sculptPanels.layoutBase') },
   { value: 'pair', label: text('sculptPanels.layoutPair') },
@@ -14,7 +14,7 @@ const LAYOUTS: Choice<Layout>[] = [
   { value: 'stages', label: text('sculptPanels.layoutStages') },
 ];
 
-const SCULPT_COLORS: Choice<SurfaceColor>[] = [
+export const SCULPT_COLORS: Choice<SurfaceColor>[] = [
   { value: 'plain', label: text('controls.colorPlain') },
   { value: 'texture', label: text('sculptPanels.colorTexture') },
   { value: 'component', label: text('controls.colorComponent') },

@@ -3,13 +3,13 @@ import { PLACEMENTS, type ViewOption } from '../../../kit/view-options';
 import { text } from '../../../texts';
 import type { ContentBelow, TrackViewOptions, VisibleVotes } from '../scene';
 
-const VOTES: Choice<VisibleVotes>[] = [
+export const VOTES: Choice<VisibleVotes>[] = [
   { value: 'none', label: text('trackPanels.votesHidden') },
   { value: 'near', label: text('trackPanels.votesNear') },
   { value: 'all', label: text('trackPanels.votesAll') },
 ];
 
-const BELOW: Choice<ContentBelow>[] = [
+export const BELOW: Choice<ContentBelow>[] = [
   { value: 'slices', label: text('trackPanels.belowSlices') },
   { value: 'boundary', label: text('trackPanels.belowBoundary') },
   { value: 'time', label: text('trackPanels.belowTime') },
