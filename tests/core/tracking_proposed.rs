@@ -431,6 +431,12 @@ fn an_object_that_another_touches_is_told() {
     assert_eq!(warnings.len(), 1, "{warnings:?}");
     assert_eq!(warnings[0].code, WarningCode::Parts);
     assert!(matches!(warnings[0].place, Some(Place::Frame(2..=4))), "{warnings:?}");
+    // One that comes in a leap of its radius and overlaps it, most of which has left its place.
+    let leaping = |t: f64| {
+        let x = if t < 2.0 { 34.0 - 4.0 * t } else { 25.0 };
+        vec![(DVec3::new(14.0, 16.0, 14.0), 8.0), (DVec3::new(x, 16.0, 14.0), 5.0)]
+    };
+    assert!(codes(&followed([48, 32, 28], 14.0, leaping)).contains(&WarningCode::Parts));
     // One that it only comes near is none, nor one that goes ahead of it at the same speed.
     assert_eq!(codes(&followed([48, 32, 28], 14.0, beside(34.0))), []);
     let ahead = |t: f64| {

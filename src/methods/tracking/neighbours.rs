@@ -17,8 +17,10 @@ const LARGE: f64 = 0.1;
 /// some of its neighbour.
 const SHARED: f64 = 0.2;
 
-/// Share of the voxels of another object that are connected to the tracked one in the next frame, from which the two touch. With
-/// a lower one, an object that moves into the place that another leaves would touch it.
+/// Share of the voxels of another object that are bright in the next frame, too, below which it has moved on, and of these, share
+/// that are connected to the tracked one, from which the two touch: with a lower one, an object that moves into the place that
+/// another leaves would touch it.
+const STILL_THERE: f64 = 0.1;
 const CONNECTED: f64 = 0.5;
 
 /// The bright voxels of a frame by parts, and those within the surface.
@@ -72,8 +74,13 @@ impl SurfaceTracker {
         let Some(now) = self.parts_at(frame, mesh, intensities, pauses).await else { return false };
         let Some(tracked) = now.tracked() else { return false };
         others.into_iter().any(|other| {
-            let both = before.of.iter().zip(&now.of).filter(|&(&a, &b)| a == other && b == tracked).count();
-            both as f64 >= CONNECTED * before.sizes[other as usize] as f64
+            let (mut still, mut connected) = (0u32, 0u32);
+            for (_, &part) in before.of.iter().zip(&now.of).filter(|&(&a, &b)| a == other && b > 0) {
+                still += 1;
+                connected += u32::from(part == tracked);
+            }
+            f64::from(still) >= STILL_THERE * before.sizes[other as usize] as f64
+                && f64::from(connected) >= CONNECTED * f64::from(still)
         })
     }
 
