@@ -31,7 +31,7 @@ type Values<Fields> = {
 /** Settings in a link: those of the fields, and the parameters of the method. */
 export type Linked<Fields> = Values<Fields> & {
   params: ParamValues;
-  /** What the link has that cannot be read, as `name=text`. */
+  /** Settings that cannot be read, as `name=text`. */
   unread?: string[];
 };
 
@@ -71,7 +71,7 @@ export const numbers = (length: number): Field<readonly number[]> => ({
   write: (list) => list.join(','),
 });
 
-/** What another field has, as it is in the app. */
+/** The values of another field, as they are in the app. */
 export const as = <T, U>(field: Field<T>, of: (value: T) => U | undefined, to: (value: U) => T): Field<U> => ({
   read: (text) => {
     const value = field.read(text);

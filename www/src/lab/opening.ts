@@ -89,12 +89,12 @@ export interface Loading<Example, Linked, Data> {
   present: Source<Example, Linked, Data> | undefined;
 }
 
-/** What a link says about the data, whatever the lab. */
+/** Settings of links to any lab. */
 interface LinkedData {
   example?: string;
   /** Name of the user's file. */
   file?: string;
-  /** What the link has that cannot be read. */
+  /** Settings that cannot be read. */
   unread?: string[];
 }
 
