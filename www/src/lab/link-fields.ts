@@ -83,6 +83,9 @@ export const as = <T, U>(field: Field<T>, of: (value: T) => U | undefined, to: (
 /** A field that a link may have up to `most` times. */
 export const many = <T>(field: Field<T>, most: number): Repeated<T> => ({ ...field, most });
 
+/** Name of the version of the defaults that a link relies on, in links to any lab: not all labs have several. */
+const VERSION = 'v';
+
 /** How a lab's settings are written in links, and read from them. */
 export interface LinkFormat<Fields> {
   /** Converts settings to the hash of an address. */
@@ -134,7 +137,8 @@ export function linkFormat<Fields extends Record<string, Field<unknown>>>(
         }
       }
       for (const [key, text] of query)
-        if (!Object.hasOwn(fields, key) && !key.startsWith('p.')) unread.push(`${key}=${text}`.slice(0, MOST_NAME));
+        if (!Object.hasOwn(fields, key) && key !== VERSION && !key.startsWith('p.'))
+          unread.push(`${key}=${text}`.slice(0, MOST_NAME));
       const settings = { ...values, params: paramsIn(query, readParam), ...(unread.length > 0 && { unread }) };
       return settings as Linked<Fields>;
     },
