@@ -62,7 +62,8 @@ impl Region {
         }
     }
 
-    fn lattice(&self) -> Lattice {
+    /// Returns the voxels of the region as a lattice.
+    pub fn lattice(&self) -> Lattice {
         Lattice { dims: self.dims, spacing: self.spacing.to_array() }
     }
 }

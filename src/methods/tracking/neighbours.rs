@@ -4,7 +4,6 @@
 //! every number of it looks like that of one body.
 
 use super::SurfaceTracker;
-use super::lattice::Lattice;
 use super::presence::inside_voxels;
 use crate::mesh::TriangleMesh;
 use crate::pauses::Pauses;
@@ -98,8 +97,7 @@ impl SurfaceTracker {
         let inside = self.voxels_within(mesh);
         pauses.now().await;
         let mask: Vec<bool> = region.frames[frame].iter().map(|&value| f64::from(value) > level).collect();
-        let lattice = Lattice { dims: region.dims, spacing: region.spacing.to_array() };
-        let (of, count) = lattice.parts(&mask, pauses).await;
+        let (of, count) = region.lattice().parts(&mask, pauses).await;
         let (mut sizes, mut within) = (vec![0; count + 1], vec![0; count + 1]);
         for (i, &part) in of.iter().enumerate().filter(|(_, part)| **part > 0) {
             sizes[part as usize] += 1;

@@ -1,7 +1,6 @@
 //! Warnings about a tracked sequence: frames in which the object ends or begins, and those in which its
 //! surface is uncertain.
 
-use super::lattice::Lattice;
 use super::region::Region;
 use super::{Cavity, SurfaceTracker};
 use crate::mesh::{TriangleMesh, measure};
@@ -168,9 +167,8 @@ impl SurfaceTracker {
         let image = region.frames[frame].iter().enumerate();
         let mask: Vec<bool> =
             image.map(|(i, &value)| inside.contains(i) && f64::from(value) > level).collect();
-        let lattice = Lattice { dims: region.dims, spacing: region.spacing.to_array() };
         pauses.now().await;
-        let (parts, count) = lattice.parts(&mask, pauses).await;
+        let (parts, count) = region.lattice().parts(&mask, pauses).await;
         let mut sizes = vec![0usize; count + 1];
         parts.iter().filter(|part| **part > 0).for_each(|&part| sizes[part as usize] += 1);
         let all: usize = sizes.iter().sum();

@@ -2,7 +2,7 @@
  * The settings in links to a lab, as it declares them: how each is read from a text, and written. What a link has beyond them, or
  * what cannot be read, is named, so that the lab can say so.
  */
-import type { ParamValues } from '../engine/protocol';
+import type { ParamValues, Vec3 } from '../engine/protocol';
 import type { Choice } from '../kit/field';
 import { allIn, listOf, MOST_NAME, paramsIn, queryOf, readValue } from './link-query';
 
@@ -31,7 +31,7 @@ type Values<Fields> = {
 /** Settings in a link: those of the fields, and the parameters of the method. */
 export type Linked<Fields> = Values<Fields> & {
   params: ParamValues;
-  /** Settings that cannot be read, as `name=text`. */
+  /** Unknown settings, and those with an invalid value, as `name=text`. */
   unread?: string[];
 };
 
@@ -79,6 +79,13 @@ export const as = <T, U>(field: Field<T>, of: (value: T) => U | undefined, to: (
   },
   write: (value) => field.write(to(value)),
 });
+
+/** A point. */
+export const point = as(
+  numbers(3),
+  ([x = 0, y = 0, z = 0]): Vec3 => [x, y, z],
+  (one) => one,
+);
 
 /** A field that a link may have up to `most` times. */
 export const many = <T>(field: Field<T>, most: number): Repeated<T> => ({ ...field, most });

@@ -94,7 +94,7 @@ interface LinkedData {
   example?: string;
   /** Name of the user's file. */
   file?: string;
-  /** Settings that cannot be read. */
+  /** Unknown settings, and those with an invalid value. */
   unread?: string[];
 }
 

@@ -1,7 +1,7 @@
 /** Converts the Reconstruct lab's settings to the hash of an address, `#reconstruct?…`, and back. */
 import { shortenedPoint } from '../../engine/placing';
 import type { ParamValues, Vec3 } from '../../engine/protocol';
-import { as, type Field, integer, linkFormat, many, name, numbers, oneOfChoices } from '../../lab/link-fields';
+import { type Field, integer, linkFormat, many, name, oneOfChoices, point } from '../../lab/link-fields';
 import { differing } from '../../lab/link-query';
 import type { SurfaceColor } from '../../scene/surface';
 import { withPaper } from './before';
@@ -38,12 +38,6 @@ export interface LinkedCloud extends Partial<CloudChoice> {
   photo?: number;
   unread?: string[];
 }
-
-const point = as(
-  numbers(3),
-  ([x = 0, y = 0, z = 0]): Vec3 => [x, y, z],
-  (one) => one,
-);
 
 /** Indices of points, each once. */
 const indices: Field<number[]> = {

@@ -12,6 +12,7 @@ import {
   numbers,
   oneOf,
   oneOfChoices,
+  point,
 } from '../../lab/link-fields';
 import { differing, readValue } from '../../lab/link-query';
 import { IMAGES, OWN_PREPARATION, type TrackExample } from './examples';
@@ -46,11 +47,6 @@ const box = as(
   numbers(6),
   (ends): Box => ({ min: ends.slice(0, 3) as Vec3, max: ends.slice(3) as Vec3 }),
   ({ min, max }) => [...min, ...max],
-);
-const point = as(
-  numbers(3),
-  ([x = 0, y = 0, z = 0]): Vec3 => [x, y, z],
-  (one) => one,
 );
 const binning = as(
   oneOf(['1', '2']),
