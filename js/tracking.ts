@@ -15,6 +15,7 @@ import {
 } from './stepper.js';
 import { RawProposal, RawTracker, RawTrackerCreation, RawTrackingOptions, TriangleCopy } from './vesicle.js';
 import { type Volume, volumeHandle } from './volume.js';
+import type { Warning } from './warning.js';
 import { ModelWarnings, notesOf } from './warnings.js';
 
 /** Parameters of the tracker; `paramSpecs('tracking')` has their ranges, defaults and descriptions. */
@@ -221,7 +222,7 @@ export class SurfaceTracker implements Stepper {
     this.#meshHandle = new Handle('Mesh', () => this.#handle.use((raw) => raw.mesh()));
     this.#warnings = new ModelWarnings(known.volume.warnings, known.start?.warnings);
     this.#frame = frameOf(known.volume);
-    this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warnings.of({ frame: this.frame }), this.#frame);
+    this.#mesh = wrapMesh(this.#meshHandle, true, () => this.#warningsAt(this.frame), this.#frame);
   }
 
   /**
@@ -395,12 +396,20 @@ export class SurfaceTracker implements Stepper {
     if (integer('frame', frame, { max: frames - 1 }) >= done) {
       throw invalid('frame', `${frame} is not tracked yet; ${done} of ${frames} frames are`);
     }
-    const warnings = this.#warnings.of({ frame });
+    const warnings = this.#warningsAt(frame);
     return wrapMesh(
       new Handle('Mesh', () => this.#runner.use((raw) => raw.meshAt(frame) as import('./vesicle.js').RawMesh)),
       false,
       () => warnings,
       this.#frame,
+    );
+  }
+
+  /** Returns what concerns a frame, also if it concerns others. */
+  #warningsAt(frame: number): Warning[] {
+    return this.#warnings.of(
+      { frame },
+      this.#runner.use((raw) => raw.warningsAt(frame) as Warning[]),
     );
   }
 

@@ -110,9 +110,12 @@ export class ModelWarnings {
     this.#report = [];
   }
 
-  /** Returns all warnings, but for those about another frame or label than the given one. */
-  of(place: { frame?: number; label?: number } = {}): Warning[] {
-    return mergedWarnings(this.#data, this.#report).filter(({ where }) => {
+  /**
+   * Returns all warnings, but for those about another frame or label than the given one; with others than those of the last
+   * report, if they are given.
+   */
+  of(place: { frame?: number; label?: number } = {}, report = this.#report): Warning[] {
+    return mergedWarnings(this.#data, report).filter(({ where }) => {
       if (where && 'frame' in where && place.frame !== undefined) return where.frame === place.frame;
       return !(where && 'label' in where && place.label !== undefined) || where.label === place.label;
     });

@@ -248,6 +248,12 @@ impl RawTracker {
         self.0.ready().boundary(frame).into_iter().flatten().collect()
     }
 
+    /// Returns the warnings about a frame.
+    #[wasm_bindgen(js_name = warningsAt)]
+    pub fn warnings_at(&self, frame: usize) -> Result<JsValue, JsValue> {
+        Ok(to_js(&self.0.ready().warnings_in(frame))?)
+    }
+
     /// Returns the volume that the surface encloses in each finished frame, in cubed world units.
     pub fn volumes(&self) -> Vec<f64> {
         self.0.ready().volumes()

@@ -157,6 +157,61 @@ fn volumes_of_small_balls_are_right_on_average() {
     }
 }
 
+/// Returns a sequence of two frames of a box at rest, given by its centre and half its sides; voxels are as bright as the share
+/// of them that is in it.
+fn resting_box(center: [f64; 3], half: [f64; 3]) -> Volume {
+    let share = |x: f64, center: f64, half: f64| {
+        ((x + 0.5).min(center + half) - (x - 0.5).max(center - half)).clamp(0.0, 1.0)
+    };
+    sequence([30; 3], 2, DAffine3::IDENTITY, |_, p| {
+        let shares = [0, 1, 2].map(|k| share(p[k], center[k], half[k]));
+        (20.0 + 150.0 * shares[0] * shares[1] * shares[2]) as f32
+    })
+}
+
+/// All faces between voxels at such a side are to the same side of it, so that their positions do not even out.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn flat_sides_between_voxels_are_where_the_image_has_them() {
+    for (center, half) in [
+        ([14.5, 14.5, 14.5], [6.2, 6.2, 6.2]),
+        ([14.9, 14.2, 14.6], [6.6, 6.6, 6.6]),
+        ([14.0, 14.3, 14.8], [7.4, 7.5, 7.6]),
+        ([14.5, 14.5, 14.5], [10.0, 10.0, 1.8]),
+        ([14.3, 14.7, 14.4], [10.0, 10.0, 2.3]),
+        ([14.5, 14.5, 14.2], [10.0, 10.0, 2.5]),
+    ] {
+        let tracker = tracked(options(resting_box(center, half))).unwrap();
+        let expected = 8.0 * half[0] * half[1] * half[2];
+        let ratios = [0, 1].map(|frame| tracker.volumes()[frame] / expected);
+        println!("{half:?}: {ratios:.4?} {:?}", told(&tracker));
+        // Edges and corners are rounded.
+        assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.03), "{half:?}: {ratios:?}");
+    }
+}
+
+#[test]
+fn objects_thinner_than_plane_fits_are_told() {
+    for half in [1.2, 1.8] {
+        let tracker = tracked(options(resting_box([14.5; 3], [10.0, 10.0, half]))).unwrap();
+        println!("{half}: {:?} {:?}", tracker.volumes(), told(&tracker));
+        let expected: &[_] = if half < 1.5 { &[(SmallObject, 0), (SmallObject, 1)] } else { &[] };
+        assert_eq!(told(&tracker), expected);
+    }
+}
+
+/// The level of its windows is between that of the frame and those of the others, and is not where the surface is.
+#[test]
+fn a_frame_dimmed_by_less_than_a_third_has_its_volume() {
+    let volume = sequence([SIDE; 3], 5, DAffine3::IDENTITY, |t, p| {
+        (20.0 + 130.0 * brightness(&[BALL], p)) * if t == 2 { 0.7 } else { 1.0 }
+    });
+    let tracker = tracked(options(volume)).unwrap();
+    let ratios: Vec<f64> = tracker.volumes().iter().map(|volume| volume / size(BALL)).collect();
+    assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.04), "{ratios:?}");
+    assert_eq!(told(&tracker), []);
+}
+
 use WarningCode::{BeginsInFrame, EndsInFrame, SmallObject, UnevenBrightness};
 
 /// The balls in each frame, the volumes expected, and the warnings.
@@ -336,7 +391,17 @@ fn voxels_that_are_not_numbers_are_outside() {
             let value = 200.0 * if reach > 0.0 { brightness(&[BALL], p) } else { 1.0 };
             if depth > -reach { value + random.within(0.0, 8.0) as f32 } else { f32::NAN }
         });
-        assert_volumes(&tracked(options(volume)).unwrap(), &[v; 3]);
+        let tracker = tracked(options(volume)).unwrap();
+        if reach == 0.5 {
+            // There are no voxels that show how dark it is outside.
+            assert!(
+                tracker.volumes().iter().all(|found| (found / v - 1.0).abs() < 0.03),
+                "{:?}",
+                tracker.volumes()
+            );
+        } else {
+            assert_volumes(&tracker, &[v; 3]);
+        }
     }
     // A frame without values, or of one value, has no object, and leaves the others as they are.
     for blank in [f32::NAN, 0.0, 90.0, 300.0] {

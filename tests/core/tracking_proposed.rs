@@ -11,7 +11,7 @@ use vesicle::methods::tracking::{
 };
 use vesicle::pauses::{advance, finished};
 use vesicle::volume::{Enrichment, Volume, VolumeInit, Voxels};
-use vesicle::warning::{Place, WarningCode};
+use vesicle::warning::{Place, Warning, WarningCode};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -360,6 +360,12 @@ fn a_box_that_cuts_the_object_and_a_volume_that_jumps_are_told() {
     let tracker = tracked(cut);
     let warning = tracker.warnings().into_iter().find(|warning| warning.code == WarningCode::TouchesBox);
     assert_eq!(warning.map(|warning| warning.place), Some(Some(Place::Frame(0))));
+    for frame in 0..tracker.frames() {
+        let here = tracker.warnings_in(frame);
+        let is_told = |warning: &Warning| warning.code == WarningCode::TouchesBox;
+        assert!(here.iter().any(is_told), "{frame}: {here:?}");
+        assert!(here.iter().all(|warning| warning.place == Some(Place::Frame(frame as u32))), "{here:?}");
+    }
     scene.radii = [18.0, 18.0, 18.0, 13.5, 18.0, 18.0];
     let volume = scene.volume();
     let tracker = tracked(options(volume, &proposal, Cavity::Open));

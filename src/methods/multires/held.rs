@@ -183,7 +183,7 @@ impl Held {
     pub fn warnings(&self) -> Vec<Warning> {
         let stopped = self.has_stopped.then(|| {
             let what = "An ellipsoid stopped before its target: the surface around it would have folded up. It moved as far as it \
-                        goes this way: use a smaller one, or one further from others.";
+                        goes this way: undo the move, or use a smaller one, or one further from others.";
             Warning::new(WarningCode::HandleStopped, what)
         });
         self.crossings.warning().into_iter().chain(stopped).collect()

@@ -17,7 +17,7 @@ impl Region {
 
     /// Returns the coordinates of the voxels before and after the face in `direction` after `voxel`; the same voxel
     /// twice for a face along time.
-    fn voxels_at_face(&self, direction: usize, voxel: u32) -> [[usize; 3]; 2] {
+    pub fn voxels_at_face(&self, direction: usize, voxel: u32) -> [[usize; 3]; 2] {
         let before = self.voxel(voxel);
         let mut after = before;
         if direction != TIME {

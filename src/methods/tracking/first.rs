@@ -5,6 +5,7 @@ use super::extremal::plane;
 use super::labelling::{MIN_WEIGHT, VoxelBox, label_bright};
 use super::region::Region;
 use super::samples::{Falloff, SampleField};
+use super::shifts::Shifts;
 use super::vote::{Faces, X, Y, Z, too_much_boundary};
 use crate::math::{DAffine3, DVec3};
 use crate::mesh::TriangleMesh;
@@ -90,7 +91,8 @@ async fn oriented(
     falloff: Falloff,
     pauses: &Pauses,
 ) -> Vec<Oriented> {
-    let field = SampleField::single_frame(region, falloff, faces, pauses).await;
+    // Faces keep objects apart with less than a voxel between them.
+    let field = SampleField::single_frame(region, falloff, faces, &Shifts::default(), pauses).await;
     let mut points = Vec::new();
     for direction in [X, Y, Z] {
         for face in faces[direction].iter().filter(|face| face.weight >= MIN_WEIGHT) {

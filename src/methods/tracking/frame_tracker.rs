@@ -178,17 +178,19 @@ impl FrameTracker {
 
     /// Corrects the bias of the fitted planes on curved surfaces: a plane lies on the inner side by the variance of the
     /// points along it, R²/8 for points weighted by θ = exp(−4r²/R²) with the radius R of the parameters, times the
-    /// mean curvature; and that of the triangles between vertices on the surface, which lie on its inner side by e²/8 times
-    /// the mean curvature on average, with their edge length e. Vertices move along their normals by as much, outwards
-    /// where the surface is convex, but at most by [`MAX_CURVATURE_CORRECTION`].
+    /// mean curvature; that of the triangles between vertices on the surface, which lie on its inner side by e²/8 times
+    /// the mean curvature on average, with their edge length e; and that of the points, which lie on the inner side by a²/12
+    /// times the mean curvature, as voxels hold the mean intensity over their side a. Vertices move along their normals by as
+    /// much, outwards where the surface is convex, but at most by [`MAX_CURVATURE_CORRECTION`].
     async fn correct_curvature_bias(
         &mut self,
         mesh: &mut Mesh,
         context: &FrameContext<'_>,
         statistics: &mut FrameStatistics,
     ) {
-        let spread = ((context.params.radius * context.params.radius + self.edge * self.edge) / 8.0) as f32;
-        let limit = (MAX_CURVATURE_CORRECTION * context.region.spacing.min_element()) as f32;
+        let (radius, side) = (context.params.radius, context.region.spacing.min_element());
+        let spread = ((radius * radius + self.edge * self.edge) / 8.0 + side * side / 12.0) as f32;
+        let limit = (MAX_CURVATURE_CORRECTION * side) as f32;
         let bends = curvature(&mesh.to_triangles()).mean;
         context.pauses.after(mesh.slots()).await;
         let mut displacements = vec![Vec3::ZERO; mesh.slots()];

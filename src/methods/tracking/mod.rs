@@ -34,6 +34,7 @@ mod project;
 mod propose;
 mod region;
 mod samples;
+mod shifts;
 mod start;
 mod state;
 mod vote;
@@ -726,7 +727,9 @@ impl SurfaceTracker {
         let shortest_side = self.region.spacing.min_element();
         let (damping, time_scale) = (self.params.damping, falloff.time_scale);
         let box_side_voxels = self.region.bright_box_side_voxels(&self.faces[frame], pauses).await;
-        let own = SampleField::single_frame(&self.region, falloff, &self.faces[frame], pauses).await;
+        let faces = &self.faces[frame];
+        let shifts = self.region.shifts(frame, faces, self.voting.window().half_width, pauses).await;
+        let own = SampleField::single_frame(&self.region, falloff, faces, &shifts, pauses).await;
         SpaceTimeSamples {
             field,
             own,

@@ -95,6 +95,7 @@ impl SpaceTimeSamples {
 mod tests {
     use super::super::region::Region;
     use super::super::samples::Falloff;
+    use super::super::shifts::Shifts;
     use super::super::vote::{Face, Faces, TIME, X, Y, Z};
     use super::super::working_space::WorkingSpace;
     use super::*;
@@ -147,7 +148,8 @@ mod tests {
         let frames: Vec<_> = FALLOFF.offsets(9).map(|offset| (offset, faces(offset))).collect();
         let frames: Vec<_> = frames.iter().map(|(offset, faces)| (*offset, faces)).collect();
         let field = finished(SampleField::of(&region, FALLOFF, &frames, &Pauses::default()));
-        let own = finished(SampleField::single_frame(&region, FALLOFF, &faces(0), &Pauses::default()));
+        let (own, unshifted) = (faces(0), Shifts::default());
+        let own = finished(SampleField::single_frame(&region, FALLOFF, &own, &unshifted, &Pauses::default()));
         SpaceTimeSamples {
             field,
             own,
@@ -198,6 +200,35 @@ mod tests {
                     assert!((a - b).abs() < spread * radius * radius * weight, "{a} {b}");
                 }
             }
+        }
+    }
+
+    /// All points are shifted from their faces onto a plane, wherever between the faces it is.
+    #[test]
+    fn shifted_points_are_on_their_plane() {
+        let region = region();
+        for (normal, distance) in
+            [(DVec3::X, 9.2), (DVec3::Z, 11.9), (DVec3::new(0.48, 0.6, 0.64), 17.3), (-DVec3::Y, -12.6)]
+        {
+            let mut faces = plane_faces(&region, normal, distance, 0.0, 0.0);
+            let shifts = [X, Y, Z].map(|direction| {
+                if normal[direction] == 0.0 {
+                    faces[direction].clear();
+                }
+                let shift = |face: &Face| {
+                    let off = distance - normal.dot(region.face(direction, face.voxel).0);
+                    (off / normal[direction] / SPACING[direction]) as f32
+                };
+                faces[direction].iter().map(shift).collect()
+            });
+            let own =
+                finished(SampleField::single_frame(&region, FALLOFF, &faces, &shifts, &Pauses::default()));
+            let middle = DVec3::new(9.6, 11.2, 12.1);
+            let at = middle + normal * (distance + 0.7 - normal.dot(middle));
+            let fit = plane(&own.sums(at)).unwrap();
+            let away = fit.distance * fit.normal.dot(normal);
+            assert!((away + 0.7).abs() < 1e-4, "{normal}: {away}");
+            assert!(fit.normal.cross(normal).length() < 1e-4, "{normal}: {}", fit.normal);
         }
     }
 

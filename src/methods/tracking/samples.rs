@@ -5,6 +5,7 @@
 //! separable over the axes. So the frames are summed once, and each query sums along rows of voxels only.
 
 use super::region::Region;
+use super::shifts::Shifts;
 use super::vote::{Face, Faces, TIME, X, Y, Z};
 use crate::math::DVec3;
 use crate::pauses::Pauses;
@@ -69,14 +70,15 @@ pub(super) struct SampleField {
     /// By axis, the constant factor by which the ratio of the weight θ between neighbouring voxels changes from voxel
     /// to voxel; it saves exponentials.
     changes: DVec3,
-    /// Whether the points are of several times, so that sums with time are kept.
-    has_times: bool,
+    /// Whether the points are those of a single frame, each shifted along the direction of its face.
+    is_shifted: bool,
     /// Boundary points by the direction of their faces; faces along time are at voxel centres.
     sites: [FaceWeights; 4],
 }
 
-/// Weights of the boundary points on the faces of one direction, by face, summed over the frames: times θ(t), and for
-/// points of several times also times t θ(t) and t² θ(t), where t is the distance in time in world units.
+/// Weights of the boundary points on the faces of one direction, by face, summed over the frames: times θ(t), t θ(t) and
+/// t² θ(t), where t is the distance in time in world units. Of a single frame, t is instead the distance from the face to the
+/// boundary point, along the direction of the face, and θ is 1.
 #[derive(Clone, Debug, Default)]
 struct FaceWeights {
     weights: [Vec<f32>; 3],
@@ -88,12 +90,11 @@ struct FaceWeights {
 }
 
 impl FaceWeights {
-    /// Creates lists for the points of `sources`, `count` of them, in `lines` rows of `nx` voxels.
+    /// Creates lists for the points of `sources`, in `lines` rows of `nx` voxels.
     async fn new(
         sources: &[(&[Face], f64)],
         [nx, lines]: [usize; 2],
         padding: usize,
-        count: usize,
         pauses: &Pauses,
     ) -> Self {
         let mut extents = vec![[u32::MAX, 0]; lines];
@@ -112,11 +113,17 @@ impl FaceWeights {
             len += end.checked_sub(*first).map_or(0, |count| count as usize + 2 * padding);
         }
         let mut weights: [Vec<f32>; 3] = Default::default();
-        for list in weights.iter_mut().take(count) {
+        for list in &mut weights {
             *list = vec![0.0; len];
             pauses.after(len / POINTS_PER_UNIT / 8).await;
         }
         Self { weights, extents, starts }
+    }
+
+    /// Returns the index of the weight of the face after a voxel, in rows of `nx` voxels.
+    fn index(&self, voxel: usize, nx: usize, padding: usize) -> usize {
+        let (line, x) = (voxel / nx, voxel % nx);
+        self.starts[line] as usize + padding + x - self.extents[line][0] as usize
     }
 }
 
@@ -132,7 +139,7 @@ impl SampleField {
             falloff,
             padding,
             changes: DVec3::new(change(0), change(1), change(2)),
-            has_times: true,
+            is_shifted: false,
             sites: Default::default(),
         }
     }
@@ -153,11 +160,27 @@ impl SampleField {
         field
     }
 
-    /// Creates a field with the points of a single frame, without points on faces along time.
-    pub async fn single_frame(region: &Region, falloff: Falloff, faces: &Faces, pauses: &Pauses) -> Self {
-        let mut field = Self { has_times: false, ..Self::new(region, falloff) };
-        for direction in [X, Y, Z] {
-            field.set_direction(direction, &[(&faces[direction][..], 0.0)], pauses).await;
+    /// Creates a field with the points of a single frame, without points on faces along time. Each is at the distance `shifts`,
+    /// by direction and face, from its face; on it, without any.
+    pub async fn single_frame(
+        region: &Region,
+        falloff: Falloff,
+        faces: &Faces,
+        shifts: &Shifts,
+        pauses: &Pauses,
+    ) -> Self {
+        let mut field = Self { is_shifted: true, ..Self::new(region, falloff) };
+        let of_direction = faces.iter().zip(shifts).zip(region.spacing.to_array());
+        for (direction, ((faces, shifts), side)) in of_direction.enumerate() {
+            field.set_direction(direction, &[(faces, 0.0)], pauses).await;
+            let site = &mut field.sites[direction];
+            for (face, shift) in faces.iter().zip(shifts) {
+                let at = site.index(face.voxel as usize, region.dims[0], field.padding);
+                let away = side as f32 * shift;
+                site.weights[1][at] = face.weight * away;
+                site.weights[2][at] = face.weight * away * away;
+            }
+            pauses.after(faces.len() / POINTS_PER_UNIT).await;
         }
         field
     }
@@ -168,17 +191,14 @@ impl SampleField {
             return;
         }
         let [nx, ny, nz] = self.dims;
-        let count = if self.has_times { 3 } else { 1 };
-        let mut site = FaceWeights::new(sources, [nx, ny * nz], self.padding, count, pauses).await;
+        let mut site = FaceWeights::new(sources, [nx, ny * nz], self.padding, pauses).await;
         for &(faces, time) in sources {
             let theta = self.falloff.theta(time);
             let factors = [theta, theta * time, theta * time * time].map(|factor| factor as f32);
             for faces in faces.chunks(POINTS_PER_CHUNK) {
                 for face in faces {
-                    let (line, x) = (face.voxel as usize / nx, face.voxel as usize % nx);
-                    let from = site.starts[line] as usize + self.padding;
-                    let at = from + x - site.extents[line][0] as usize;
-                    for (list, factor) in site.weights.iter_mut().take(count).zip(factors) {
+                    let at = site.index(face.voxel as usize, nx, self.padding);
+                    for (list, factor) in site.weights.iter_mut().zip(factors) {
                         list[at] += factor * face.weight;
                     }
                 }
@@ -201,24 +221,20 @@ impl SampleField {
             if sites.extents.is_empty() {
                 continue;
             }
-            match (x.count <= LANES, self.has_times) {
-                (true, true) => self.gather::<1, true>(sites, [x, y, z], &mut sums),
-                (true, false) => self.gather::<1, false>(sites, [x, y, z], &mut sums),
-                (false, true) => self.gather::<MAX_VECTORS, true>(sites, [x, y, z], &mut sums),
-                (false, false) => self.gather::<MAX_VECTORS, false>(sites, [x, y, z], &mut sums),
+            let mut of_direction = Sums::default();
+            if x.count <= LANES {
+                self.gather::<1>(sites, [x, y, z], &mut of_direction);
+            } else {
+                self.gather::<MAX_VECTORS>(sites, [x, y, z], &mut of_direction);
             }
+            sums += if self.is_shifted { of_direction.shifted(direction) } else { of_direction };
         }
         sums
     }
 
     /// Sums over the boundary points on the faces of one direction within the cut-off radius of a position, and adds
     /// the results to `sums`. `N` vectors of lanes along x hold them all.
-    fn gather<const N: usize, const TIMED: bool>(
-        &self,
-        sites: &FaceWeights,
-        [x, y, z]: [&AxisWeights; 3],
-        sums: &mut Sums,
-    ) {
+    fn gather<const N: usize>(&self, sites: &FaceWeights, [x, y, z]: [&AxisWeights; 3], sums: &mut Sums) {
         let square = self.falloff.radius * self.falloff.radius;
         let near = [x.first, x.end()];
         let mut planes = PlaneSums::<N>::default();
@@ -234,16 +250,10 @@ impl SampleField {
                 }
                 let from = (i64::from(sites.starts[line]) + self.padding as i64 + x.first - first) as usize;
                 let row = |power: usize| lanes(&sites.weights[power][from..from + N * LANES]);
-                rows.add(&row(0), dy as f32, y.weight(j));
-                if TIMED {
-                    rows.add_timed([row(1), row(2)], dy as f32, y.weight(j));
-                }
+                rows.add([row(0), row(1), row(2)], dy as f32, y.weight(j));
             }
             if rows.used {
                 planes.add(&rows, dz as f32, z.weight(k));
-                if TIMED {
-                    planes.add_timed(&rows, dz as f32, z.weight(k));
-                }
             }
         }
         if planes.rows.used {
@@ -334,17 +344,12 @@ impl<const N: usize> Default for RowSums<N> {
 
 impl<const N: usize> RowSums<N> {
     #[inline]
-    fn add(&mut self, weights: &Lanes<N>, dy: f32, theta: f32) {
+    fn add(&mut self, [weights, timed, squared]: [Lanes<N>; 3], dy: f32, theta: f32) {
         let powers = [theta, theta * dy, theta * dy * dy];
-        self.plain.iter_mut().zip(powers).for_each(|(to, power)| add(to, weights, power));
-        self.used = true;
-    }
-
-    #[inline]
-    fn add_timed(&mut self, [timed, squared]: [Lanes<N>; 2], dy: f32, theta: f32) {
-        let powers = [theta, theta * dy];
+        self.plain.iter_mut().zip(powers).for_each(|(to, power)| add(to, &weights, power));
         self.timed.iter_mut().zip(powers).for_each(|(to, power)| add(to, &timed, power));
         add(&mut self.squared, &squared, theta);
+        self.used = true;
     }
 }
 
@@ -370,16 +375,12 @@ impl<const N: usize> PlaneSums<N> {
     fn add(&mut self, rows: &RowSums<N>, dz: f32, theta: f32) {
         let [one, y, _] = &rows.plain;
         self.rows.plain.iter_mut().zip(&rows.plain).for_each(|(to, lanes)| add(to, lanes, theta));
-        self.z_sums.iter_mut().zip([one, y]).for_each(|(to, lanes)| add(to, lanes, theta * dz));
-        add(&mut self.zz_sums, one, theta * dz * dz);
-        self.rows.used = true;
-    }
-
-    #[inline]
-    fn add_timed(&mut self, rows: &RowSums<N>, dz: f32, theta: f32) {
         self.rows.timed.iter_mut().zip(&rows.timed).for_each(|(to, lanes)| add(to, lanes, theta));
         add(&mut self.rows.squared, &rows.squared, theta);
-        add(&mut self.z_sums[2], &rows.timed[0], theta * dz);
+        let by_z = [one, y, &rows.timed[0]];
+        self.z_sums.iter_mut().zip(by_z).for_each(|(to, lanes)| add(to, lanes, theta * dz));
+        add(&mut self.zz_sums, one, theta * dz * dz);
+        self.rows.used = true;
     }
 
     /// Adds up the sums over x, the last of the three axes, with the factors of θ and the powers of x, and adds the
@@ -418,4 +419,35 @@ pub(super) struct Sums {
     pub first: [f64; 4],
     /// Weighted sums of the products of two coordinates, in the order xx xy xz xt yy yz yt zz zt tt; t stands for ct.
     pub second: [f64; 10],
+}
+
+impl Sums {
+    /// Returns sums over points on faces of one direction as those over points at the distance t from their faces, along
+    /// that direction; t then is no coordinate.
+    fn shifted(self, direction: usize) -> Self {
+        let [t, tt] = [self.first[TIME], self.second[index(TIME, TIME)]];
+        let mut sums = self;
+        sums.first[direction] += t;
+        for k in [X, Y, Z] {
+            sums.second[index(direction, k)] += self.second[index(k, TIME)];
+            sums.second[index(k, TIME)] = 0.0;
+        }
+        sums.second[index(direction, direction)] += self.second[index(direction, TIME)] + tt;
+        (sums.first[TIME], sums.second[index(TIME, TIME)]) = (0.0, 0.0);
+        sums
+    }
+}
+
+impl std::ops::AddAssign for Sums {
+    fn add_assign(&mut self, other: Self) {
+        self.weight += other.weight;
+        self.first.iter_mut().zip(other.first).for_each(|(sum, term)| *sum += term);
+        self.second.iter_mut().zip(other.second).for_each(|(sum, term)| *sum += term);
+    }
+}
+
+/// Returns the index in [`Sums::second`] of the product of two coordinates.
+fn index(i: usize, j: usize) -> usize {
+    let [i, j] = [i.min(j), i.max(j)];
+    i * (7 - i) / 2 + j
 }

@@ -358,7 +358,7 @@ impl Rows {
 
 /// A histogram of the quantised intensities of voxels, by which a window is split into clusters.
 #[derive(Clone)]
-struct Histogram([u16; 256]);
+pub(super) struct Histogram([u16; 256]);
 
 impl Default for Histogram {
     fn default() -> Self {
@@ -368,24 +368,39 @@ impl Default for Histogram {
 
 /// The number of voxels in one of the two clusters of a window, and the sum of their quantised intensities.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Cluster {
-    count: u32,
+pub(super) struct Cluster {
+    pub count: u32,
     sum: u32,
 }
 
 impl Cluster {
-    fn mean(self) -> f64 {
+    /// Returns the mean of the intensities.
+    pub fn mean(self) -> f64 {
         f64::from(self.sum) / f64::from(self.count)
     }
 }
 
 impl Histogram {
+    /// Adds a voxel with a quantised intensity.
+    pub fn count(&mut self, level: u8) {
+        self.0[usize::from(level)] += 1;
+    }
+
     fn add(&mut self, other: &Self) {
         self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a += b);
     }
 
     fn subtract(&mut self, other: &Self) {
         self.0.iter_mut().zip(&other.0).for_each(|(a, b)| *a -= b);
+    }
+
+    /// Returns the quantised intensity of the voxel at a rank, by intensity, from 0 on.
+    pub fn at_rank(&self, rank: u32) -> f64 {
+        let below = self.0.iter().scan(0u32, |sum, &count| {
+            *sum += u32::from(count);
+            Some(*sum)
+        });
+        below.take_while(|&sum| sum <= rank).count() as f64
     }
 
     /// Returns the number of voxels with quantised intensities in a range, and the sum of these intensities.
@@ -401,7 +416,7 @@ impl Histogram {
 
     /// Splits the histogram of a window into two clusters, the lower first, by Lloyd iterations from its lowest and
     /// highest intensity; `None` if these two differ by no more than `threshold`.
-    fn two_means(&self, threshold: f64) -> Option<(Cluster, Cluster)> {
+    pub fn two_means(&self, threshold: f64) -> Option<(Cluster, Cluster)> {
         let least = self.0.iter().position(|&count| count > 0)?;
         let greatest = self.0.iter().rposition(|&count| count > 0)?;
         if (greatest - least) as f64 <= threshold {

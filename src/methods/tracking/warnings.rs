@@ -2,7 +2,7 @@
 //! surface is uncertain.
 
 use super::region::Region;
-use super::{Cavity, SurfaceTracker};
+use super::{Cavity, FrameStatistics, SurfaceTracker};
 use crate::mesh::{TriangleMesh, measure};
 use crate::pauses::Pauses;
 use crate::warning::{Place, Warning, WarningCode};
@@ -13,9 +13,10 @@ use crate::warning::{Place, Warning, WarningCode};
 /// frames of a cine sequence are warned of.
 const MAX_SHIFT: f64 = 0.3;
 
-/// Radius of a ball with the volume of the object, in units of the radius of the plane fits, below which its volume is
-/// uncertain: planes fitted to half of a ball and more do not show its curvature. At this radius errors are 5 %.
-const SMALL: f64 = 1.4;
+/// Thickness of the object, 2V/A with its volume V and area A as of a plate, in units of the radius of the plane fits, below which its
+/// volume is uncertain: planes fitted to half of a ball and more do not show its curvature. Of a ball it is ⅔ of the radius,
+/// and at this thickness errors are 5 %, as of plates and bars.
+const THIN: f64 = 0.93;
 
 /// Share of the vertices of a surface in the sides of the box, or near them, from which it is cut off there: fewer touch it.
 const CUT: f64 = 0.01;
@@ -50,65 +51,113 @@ pub(super) struct SurfaceFacts {
     is_touched: bool,
 }
 
+/// Something that may be true of several frames, which one warning then tells of.
+struct Finding {
+    code: WarningCode,
+    text: String,
+    /// The frames of which it is true, in their order.
+    frames: Vec<usize>,
+}
+
+impl Finding {
+    fn warning(&self, frame: usize, text: String) -> Warning {
+        Warning::at(self.code, Place::Frame(frame as u32), text)
+    }
+
+    /// Returns a warning about all of its frames, placed in the first of them; `None` without any.
+    fn of_all(self) -> Option<Warning> {
+        let first = *self.frames.first()?;
+        let text = match self.frames.len() {
+            1 => self.text.clone(),
+            count => format!("{} ({count} frames, from this one on)", self.text),
+        };
+        Some(self.warning(first, text))
+    }
+
+    /// Returns a warning about a frame; `None` if it is none of its frames.
+    fn of_frame(self, frame: usize) -> Option<Warning> {
+        self.frames.contains(&frame).then(|| self.warning(frame, self.text.clone()))
+    }
+}
+
 impl SurfaceTracker {
-    /// Returns what a user should know about the frames tracked so far, in their order.
+    /// Returns what a user should know about the frames tracked so far: each finding once, in the first frame of which it is
+    /// true.
     pub fn warnings(&self) -> Vec<Warning> {
-        let mut warnings = Vec::new();
-        for frame in 0..self.meshes.len() {
-            let before = match frame.checked_sub(1) {
-                Some(before) => self.has_object(before),
-                None => self.start.vertex_count() > 0,
-            };
-            let (is_there, is_lost) = (self.has_object(frame), self.lost.contains(&(frame as u32)));
-            if before && (!is_there || is_lost) {
-                warnings.push(ends(frame));
-            }
-            if is_there && frame > 0 && (!before || is_lost) {
-                warnings.push(if is_lost { begins_anew(frame) } else { begins(frame) });
-            }
-            if is_there {
-                // Steps at the surface of a small object are not those of its boundary.
-                warnings.extend(self.small_object(frame).or_else(|| self.uneven_brightness(frame)));
-                warnings.extend(self.volume_jump(frame));
-            }
-        }
+        let mut warnings: Vec<_> =
+            (0..self.meshes.len()).flat_map(|frame| self.warnings_of_one(frame)).collect();
         warnings.extend(self.cycle_warning());
-        warnings.extend(self.missing_boundary());
-        warnings.extend(self.warning_of_frames(|facts| facts.is_cut, cut_by_box));
-        warnings.extend(self.warning_of_frames(|facts| facts.is_divided, divided));
-        warnings.extend(self.warning_of_frames(|facts| facts.is_touched, touched));
-        let with_handles = |frames| has_handles(frames, self.cavity, self.is_ring());
-        warnings.extend(self.warning_of_frames(|facts| facts.genus > 0, with_handles));
+        warnings.extend(self.findings().into_iter().filter_map(Finding::of_all));
         warnings
     }
 
-    /// Returns a warning about the frames of which something is true, placed in the first of them; `None` without any. `text`
-    /// is given the number of these frames.
-    fn warning_of_frames(
-        &self,
-        is_true: impl Fn(&SurfaceFacts) -> bool,
-        text: impl Fn(usize) -> (WarningCode, String),
-    ) -> Option<Warning> {
-        let first = self.facts.iter().position(&is_true)?;
-        let (code, text) = text(self.facts.iter().filter(|facts| is_true(facts)).count());
-        Some(Warning::at(code, Place::Frame(first as u32), text))
+    /// Returns what a user should know about a frame, among them what is also true of others.
+    pub fn warnings_in(&self, frame: usize) -> Vec<Warning> {
+        if frame >= self.meshes.len() {
+            return Vec::new();
+        }
+        let mut warnings = self.warnings_of_one(frame);
+        warnings.extend(self.cycle_warning().filter(|_| frame == 0));
+        warnings.extend(self.findings().into_iter().filter_map(|finding| finding.of_frame(frame)));
+        warnings
     }
 
-    /// Returns a warning about the frames in which the image shows no boundary at much of the surface, placed in the first.
-    fn missing_boundary(&self) -> Option<Warning> {
+    /// Returns the warnings that are about a single frame.
+    fn warnings_of_one(&self, frame: usize) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        let before = match frame.checked_sub(1) {
+            Some(before) => self.has_object(before),
+            None => self.start.vertex_count() > 0,
+        };
+        let (is_there, is_lost) = (self.has_object(frame), self.lost.contains(&(frame as u32)));
+        if before && (!is_there || is_lost) {
+            warnings.push(ends(frame));
+        }
+        if is_there && frame > 0 && (!before || is_lost) {
+            warnings.push(if is_lost { begins_anew(frame) } else { begins(frame) });
+        }
+        if is_there {
+            // Steps at the surface of a small object are not those of its boundary.
+            warnings.extend(self.small_object(frame).or_else(|| self.uneven_brightness(frame)));
+            warnings.extend(self.volume_jump(frame));
+        }
+        warnings
+    }
+
+    /// Returns what may be true of several frames, some of it of none.
+    fn findings(&self) -> [Finding; 5] {
+        let finding = |code, text, is_true: fn(&SurfaceFacts) -> bool| {
+            let frames = self.facts.iter().enumerate().filter(|(_, facts)| is_true(facts));
+            Finding { code, text, frames: frames.map(|(frame, _)| frame).collect() }
+        };
+        let handles = has_handles(self.cavity, self.is_ring());
+        // A surface that has taken in another object may hold it from then on.
+        let touched = self.facts.iter().position(|facts| facts.is_touched);
+        let since = touched.map_or(0..0, |first| first..self.facts.len());
+        let touched = since.filter(|&frame| self.has_object(frame)).collect();
+        [
+            self.missing_boundary(),
+            finding(WarningCode::TouchesBox, CUT_BY_BOX.into(), |facts| facts.is_cut),
+            finding(WarningCode::Parts, DIVIDED.into(), |facts| facts.is_divided),
+            Finding { code: WarningCode::Parts, text: TOUCHED.into(), frames: touched },
+            finding(WarningCode::Handles, handles, |facts| facts.genus > 0),
+        ]
+    }
+
+    /// Finds the frames in which the image shows no boundary at much of the surface.
+    fn missing_boundary(&self) -> Finding {
         let shares = self.statistics.iter().enumerate().map(|(frame, statistics)| {
             // Closed surfaces have about twice as many triangles as vertices.
             (frame, 2.0 * statistics.without_boundary as f64 / statistics.triangles.max(1) as f64)
         });
         let much: Vec<_> = shares.filter(|(_, share)| *share > WITHOUT_BOUNDARY).collect();
-        let &(first, _) = much.first()?;
         let percent = (100.0 * much.iter().map(|(_, share)| share.min(1.0)).fold(0.0, f64::max)) as u32;
         let text = format!(
-            "the image shows no boundary at up to {percent} % of the surface in {} frames, from this one on; it is a guess \
-             there: lower the edge threshold, or use another box",
-            much.len()
+            "the image shows no boundary at up to {percent} % of the surface; it is a guess there: lower the edge threshold, \
+             or use another box"
         );
-        Some(Warning::at(WarningCode::NoBoundary, Place::Frame(first as u32), text))
+        let frames = much.into_iter().map(|(frame, _)| frame).collect();
+        Finding { code: WarningCode::NoBoundary, text, frames }
     }
 
     /// Returns a warning if the volume differs too much from those of both frames beside it.
@@ -214,14 +263,15 @@ impl SurfaceTracker {
         })
     }
 
-    /// Returns a warning if the object is too small for the radius of the plane fits.
+    /// Returns a warning if the object is too small or thin for the radius of the plane fits.
     fn small_object(&self, frame: usize) -> Option<Warning> {
-        let volume = self.statistics[frame].volume.max(0.0);
-        let radius = libm::cbrt(volume * 0.75 / std::f64::consts::PI);
-        (radius < SMALL * self.params.radius).then(|| {
+        let FrameStatistics { volume, area, .. } = self.statistics[frame];
+        let thickness = if area > 0.0 { 2.0 * volume.max(0.0) / area } else { 0.0 };
+        (thickness < THIN * self.params.radius).then(|| {
             let text = format!(
-                "the object is as large as a ball of radius {radius:.3e}, too small for plane fits of radius {:.3e}, so \
-                 its volume is uncertain",
+                "the object is about as thin as a plate of {thickness:.3e} or a ball of radius {:.3e}, too thin for plane fits \
+                 of radius {:.3e}, so its volume is uncertain",
+                1.5 * thickness,
                 self.params.radius
             );
             Warning::at(WarningCode::SmallObject, Place::Frame(frame as u32), text)
@@ -255,39 +305,25 @@ fn intensities_at(region: &Region, frame: usize, mesh: &TriangleMesh) -> Option<
     (count > 0.0).then(|| sums.map(|sum| sum / count))
 }
 
-fn cut_by_box(frames: usize) -> (WarningCode, String) {
-    let text = format!(
-        "the box cuts the object in {frames} frames, from this one on: its volume is that within the box; use a larger box"
-    );
-    (WarningCode::TouchesBox, text)
-}
+const CUT_BY_BOX: &str = "the box cuts the object: its volume is that within the box; use a larger box";
 
-fn divided(frames: usize) -> (WarningCode, String) {
-    let text = format!(
-        "the object is in several parts within one surface in {frames} frames, from this one on: it has divided, or another \
-         touched it before; volume and area hold what joins the parts: track them one by one, each from where it is alone"
-    );
-    (WarningCode::Parts, text)
-}
+const DIVIDED: &str = "the object is in several parts within one surface: it has divided, or another touched it before; volume \
+                       and area hold what joins the parts: track them one by one, each from where it is alone";
 
-fn touched(_: usize) -> (WarningCode, String) {
-    let text = "another object touches the one that is tracked, from this frame on; the image shows them as one, so the surface \
-                may hold both, or a part of the other: use a box without it, or frames in which they are apart";
-    (WarningCode::Parts, text.into())
-}
+const TOUCHED: &str = "another object touches the one that is tracked, or did before; the image shows them as one, so the surface \
+                       may hold both, or a part of the other: use a box without it, or frames in which they are apart";
 
-fn has_handles(frames: usize, cavity: Cavity, is_ring: bool) -> (WarningCode, String) {
+fn has_handles(cavity: Cavity, is_ring: bool) -> String {
     if is_ring {
-        let text = "the surface has the same number of handles in all frames: that is right for a ring, but else noise, or \
-                    muscles that cross the object";
-        return (WarningCode::Handles, text.into());
+        return "the surface has the same number of handles in all frames: that is right for a ring, but else noise, or \
+                muscles that cross the object"
+            .into();
     }
     let close = if cavity == Cavity::Open { "close its cavity, " } else { "" };
-    let text = format!(
-        "the surface has handles in {frames} frames, from this one on: muscles that cross the object, or noise; {close}raise \
-         the edge threshold, or use a larger window"
-    );
-    (WarningCode::Handles, text)
+    format!(
+        "the surface has handles: muscles that cross the object, or noise; {close}raise the edge threshold, or use a larger \
+         window"
+    )
 }
 
 fn ends(frame: usize) -> Warning {

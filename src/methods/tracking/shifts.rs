@@ -1,0 +1,114 @@
+//! Boundary points between the centres of voxels. The votes find the faces between voxels that a boundary crosses; where
+//! between the two voxels it crosses is read from their intensities, as one where it is half-way from dark to bright.
+
+use super::region::Region;
+use super::vote::{Faces, Histogram, X, Y, Z};
+use crate::pauses::Pauses;
+
+/// Distances of boundary points from their faces, along x, y and z by face, in sides of a voxel, at most half of one.
+pub(super) type Shifts = [Vec<f32>; 3];
+
+/// Smallest difference between bright and dark around a face, as a share of the edge threshold, at which its point is
+/// shifted: the votes of windows over several frames may be those of other frames.
+const MIN_CONTRAST: f64 = 0.5;
+
+/// Largest distance of a boundary point from its face, in sides of a voxel.
+const MAX_SHIFT: f64 = 0.5;
+
+/// Change of brightness away from a boundary, in units of its step, above which there is another one.
+const OTHER_WALL: f64 = 0.25;
+
+/// Smallest change of brightness within four voxels, in units of the step of a boundary, that is all of it.
+const SHARP: f64 = 0.9;
+
+/// Number of voxels that count as one unit of work between pauses.
+const VOXELS_PER_UNIT: usize = 256;
+
+impl Region {
+    /// Returns the distances of the boundary points of a frame from their faces. `half_width` is that of the windows.
+    pub async fn shifts(&self, frame: usize, faces: &Faces, half_width: usize, pauses: &Pauses) -> Shifts {
+        let mut shifts = Shifts::default();
+        let units = (2 * half_width + 1).pow(3) / VOXELS_PER_UNIT + 1;
+        for direction in [X, Y, Z] {
+            shifts[direction].reserve_exact(faces[direction].len());
+            for face in &faces[direction] {
+                shifts[direction].push(self.shift(frame, direction, face.voxel, half_width));
+                pauses.after(units).await;
+            }
+        }
+        shifts
+    }
+
+    /// Returns the distance from the face after a voxel to where the row of voxels through it changes from bright to dark: it
+    /// is as far from the face as voxels of the row, two on either side, are bright beyond it. 0 in the sides of the box, beside
+    /// missing voxels, without contrast, and into what is a single voxel thick: both of its walls would be in its middle.
+    fn shift(&self, frame: usize, direction: usize, voxel: u32, half_width: usize) -> f32 {
+        if self.outward_at_box_side(direction, voxel).is_some() {
+            return 0.0;
+        }
+        let [here, there] = self.voxels_at_face(direction, voxel);
+        if self.has_background && [here, there].iter().any(|&at| self.frames[frame][self.index(at)] == 0) {
+            return 0.0;
+        }
+        let Some([dark, bright]) = self.levels_around(frame, direction, here, half_width) else { return 0.0 };
+        let share = |at: [usize; 3]| {
+            let value = f64::from(self.frames[frame][self.index(at)]);
+            ((value - dark) / (bright - dark)).clamp(-0.5, 1.5)
+        };
+        let ends = [self.beyond(there, here, direction), self.beyond(here, there, direction)];
+        let [first, last] = [ends[0].unwrap_or(here), ends[1].unwrap_or(there)].map(share);
+        let [a, b] = [here, there].map(share);
+        if a == b {
+            return 0.0;
+        }
+        let falls = a > b;
+        // A voxel of another wall counts as the one before it.
+        let in_wall =
+            |near: f64, end: f64, toward: f64| if (end - near) * toward > OTHER_WALL { near } else { end };
+        let toward = if falls { 1.0 } else { -1.0 };
+        let ends = [in_wall(a, first, -toward), in_wall(b, last, toward)];
+        // Along an oblique row, or in a blurred image, brightness changes further than to its ends, but evenly.
+        let shift = if (ends[0] - ends[1]).abs() < SHARP {
+            (a - 0.5) / (a - b) - 0.5
+        } else {
+            toward * (ends[0] + a + b + ends[1] - 2.0)
+        };
+        let [before, within] = if shift > 0.0 { [a, last] } else { [b, first] };
+        let is_thin = (before > 0.5) == (within > 0.5);
+        if is_thin { 0.0 } else { shift.clamp(-MAX_SHIFT, MAX_SHIFT) as f32 }
+    }
+
+    /// Returns the levels of dark and of bright voxels around the face after a voxel; `None` without contrast.
+    fn levels_around(
+        &self,
+        frame: usize,
+        direction: usize,
+        voxel: [usize; 3],
+        half_width: usize,
+    ) -> Option<[f64; 2]> {
+        // Thirds, as boundaries cut up to half of the voxels of one side: both walls of a plate three voxels thick do.
+        let range = |k: usize| {
+            let after = half_width + 1 + usize::from(k == direction);
+            voxel[k].saturating_sub(half_width)..(voxel[k] + after).min(self.dims[k])
+        };
+        let mut histogram = Histogram::default();
+        for z in range(2) {
+            for y in range(1) {
+                let row = self.index([0, y, z]);
+                self.frames[frame][row..][range(0)].iter().for_each(|&level| histogram.count(level));
+            }
+        }
+        let (low, high) = histogram.two_means(0.0)?;
+        let has_contrast = high.mean() - low.mean() >= MIN_CONTRAST * self.threshold;
+        let dark = histogram.at_rank(low.count / 3);
+        let bright = histogram.at_rank(low.count + 2 * high.count / 3);
+        has_contrast.then_some([dark, bright])
+    }
+
+    /// Returns the voxel beyond `to` as seen from `from`, its neighbour along a direction; `None` outside of the region.
+    fn beyond(&self, from: [usize; 3], to: [usize; 3], direction: usize) -> Option<[usize; 3]> {
+        let mut next = to;
+        next[direction] = (2 * to[direction]).checked_sub(from[direction])?;
+        (next[direction] < self.dims[direction]).then_some(next)
+    }
+}
