@@ -6,7 +6,7 @@ export type WarningCode =
   | 'begins-in-frame'
   /** An intensity step at the surface that differs so much from that in frames around it that the surface may be off. */
   | 'uneven-brightness'
-  /** An object so small that its volume is uncertain. */
+  /** An object so small or thin that its volume is uncertain. */
   | 'small-object'
   /** The box in which the surface is tracked cuts the object. */
   | 'touches-box'

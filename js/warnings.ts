@@ -53,7 +53,7 @@ export function placeOf({ where }: Warning): [string, Float64Array] {
 }
 
 /** Kinds of which there may be several that are not about the same. */
-const SEVERAL: readonly WarningCode[] = ['reader', 'precision'];
+const SEVERAL: readonly WarningCode[] = ['reader', 'precision', 'parts'];
 
 /** Returns the warnings of several lists, each once: of those with the same kind and place, the first. */
 export function mergedWarnings(...lists: readonly (readonly Warning[])[]): Warning[] {
@@ -111,8 +111,8 @@ export class ModelWarnings {
   }
 
   /**
-   * Returns all warnings, but for those about another frame or label than the given one; with others than those of the last
-   * report, if they are given.
+   * Returns the warnings of the data and of `report`, by default the last one, without those about another frame or label
+   * than the given one.
    */
   of(place: { frame?: number; label?: number } = {}, report = this.#report): Warning[] {
     return mergedWarnings(this.#data, report).filter(({ where }) => {

@@ -71,7 +71,7 @@ codes! {
     BeginsInFrame = "begins-in-frame",
     /// The intensity step at the surface differs so much from that in the frames around it that the surface may be off.
     UnevenBrightness = "uneven-brightness",
-    /// The object is so small that its volume is uncertain.
+    /// The object is so small or thin that its volume is uncertain.
     SmallObject = "small-object",
     /// The box in which the surface is tracked cuts the object.
     TouchesBox = "touches-box",

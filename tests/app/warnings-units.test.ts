@@ -71,7 +71,7 @@ describe('CSV', () => {
 
   test('of frames has the warnings that concern each', () => {
     const frame = { facts: {}, measures: {} } as Parameters<typeof framesCsv>[0][number];
-    const lines = cells(framesCsv([frame, frame, frame], undefined, [ENDS]));
+    const lines = cells(framesCsv([frame, frame, frame], undefined, [[], [], [ENDS]]));
     expect(lines.map((line) => line.at(-1))).toEqual(['warnings', '', '', 'ends-in-frame (frame 3)', '']);
   });
 

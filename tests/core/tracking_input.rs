@@ -127,7 +127,7 @@ fn slices_too_far_apart_are_refused_with_the_advice_to_insert_some() {
     }
 }
 
-/// Where a ball is between voxels changes its volume by up to 2 %, also without triangles; these have to be right on average.
+/// Wherever a ball is between voxels, it has its volume.
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn volumes_of_small_balls_are_right_on_average() {
@@ -152,8 +152,11 @@ fn volumes_of_small_balls_are_right_on_average() {
             let mean = found.iter().map(|ratios| ratios[frame]).sum::<f64>() / found.len() as f64;
             assert!((mean - 1.0).abs() < 0.005, "{radius}: {mean}");
         }
-        assert!(found.as_flattened().iter().all(|ratio| (ratio - 1.0).abs() < 0.025), "{radius}: {found:?}");
-        assert!(found[2].iter().all(|ratio| (ratio - 1.0).abs() < 0.01), "{radius}: {:?}", found[2]);
+        let allowed = if radius < 8.0 { 0.008 } else { 0.004 };
+        assert!(
+            found.as_flattened().iter().all(|ratio| (ratio - 1.0).abs() < allowed),
+            "{radius}: {found:?}"
+        );
     }
 }
 
@@ -394,6 +397,7 @@ fn voxels_that_are_not_numbers_are_outside() {
         let tracker = tracked(options(volume)).unwrap();
         if reach == 0.5 {
             // There are no voxels that show how dark it is outside.
+            assert_eq!(tracker.volumes().len(), 3);
             assert!(
                 tracker.volumes().iter().all(|found| (found / v - 1.0).abs() < 0.03),
                 "{:?}",

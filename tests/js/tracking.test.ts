@@ -75,6 +75,15 @@ test('the ball is tracked through its beat: valid surfaces of the right position
   }
 });
 
+test('the surface of each frame has what is true of it, also if it is true of others', () => {
+  const one = tracked({ volume: short, box: { min: REACH.min, max: [MIDDLE[0], REACH.max[1], REACH.max[2]] } });
+  const expected = [0, 1, 2].map((frame) => [expect.objectContaining({ code: 'touches-box', where: { frame } })]);
+  expect(expected.map((_, frame) => one.meshAt(frame).warnings)).toEqual(
+    expected.map((list) => expect.arrayContaining(list)),
+  );
+  expect(one.step().warnings.filter(({ code }) => code === 'touches-box')).toMatchObject([{ where: { frame: 0 } }]);
+});
+
 test('volumes decrease and increase once, and a cycle closes', () => {
   const one = tracker({ params: { cyclic: true } });
   expect(one.cycleClosureError).toBeUndefined();

@@ -21,7 +21,7 @@ const MIN_SPATIAL_NORMAL_SQUARED: f64 = 0.05;
 pub(super) struct SpaceTimeSamples {
     /// Boundary points of the frame and of those around it in time, for fits in space-time.
     pub field: SampleField,
-    /// Boundary points of the frame alone, for fits in space.
+    /// Boundary points of the frame alone, shifted from their faces, for fits in space.
     pub own: SampleField,
     /// Indices of the voxels of the frame that are bright up to a side of the processed box, which is a boundary there,
     /// sorted.

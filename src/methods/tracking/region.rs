@@ -44,7 +44,7 @@ const MIN_THICKNESS: f64 = 3.0;
 /// Upper bounds of the memory that tracking needs per voxel of the region, in bytes. The first, once: weights of the
 /// boundary points around two frames; the second, for each frame: quantised intensity and level between bright and
 /// dark.
-const BYTES: [u64; 2] = [140, 2];
+const BYTES: [u64; 2] = [188, 2];
 
 /// Maximum memory for tracking in a region, in bytes: what a browser gives to one page, less the volume.
 const MAX_BYTES: u64 = 3_000_000_000;

@@ -160,8 +160,8 @@ impl SampleField {
         field
     }
 
-    /// Creates a field with the points of a single frame, without points on faces along time. Each is at the distance `shifts`,
-    /// by direction and face, from its face; on it, without any.
+    /// Creates a field with the points of a single frame, without points on faces along time. Each is shifted from its
+    /// face by `shifts`, listed by direction and face; with empty lists, all are on their faces.
     pub async fn single_frame(
         region: &Region,
         falloff: Falloff,

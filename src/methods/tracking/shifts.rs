@@ -1,5 +1,5 @@
-//! Boundary points between the centres of voxels. The votes find the faces between voxels that a boundary crosses; where
-//! between the two voxels it crosses is read from their intensities, as one where it is half-way from dark to bright.
+//! Where between the centres of two voxels a boundary is. The votes find the faces between voxels that it crosses; the
+//! intensities of the row of voxels across a face tell how far from the face it is.
 
 use super::region::Region;
 use super::vote::{Faces, Histogram, X, Y, Z};
@@ -47,7 +47,7 @@ impl Region {
             return 0.0;
         }
         let [here, there] = self.voxels_at_face(direction, voxel);
-        if self.has_background && [here, there].iter().any(|&at| self.frames[frame][self.index(at)] == 0) {
+        if [here, there].into_iter().any(|at| self.is_missing(frame, self.index(at))) {
             return 0.0;
         }
         let Some([dark, bright]) = self.levels_around(frame, direction, here, half_width) else { return 0.0 };
@@ -55,7 +55,8 @@ impl Region {
             let value = f64::from(self.frames[frame][self.index(at)]);
             ((value - dark) / (bright - dark)).clamp(-0.5, 1.5)
         };
-        let ends = [self.beyond(there, here, direction), self.beyond(here, there, direction)];
+        let ends = [self.beyond(there, here, direction), self.beyond(here, there, direction)]
+            .map(|end| end.filter(|&at| !self.is_missing(frame, self.index(at))));
         let [first, last] = [ends[0].unwrap_or(here), ends[1].unwrap_or(there)].map(share);
         let [a, b] = [here, there].map(share);
         if a == b {
@@ -94,8 +95,8 @@ impl Region {
         let mut histogram = Histogram::default();
         for z in range(2) {
             for y in range(1) {
-                let row = self.index([0, y, z]);
-                self.frames[frame][row..][range(0)].iter().for_each(|&level| histogram.count(level));
+                let row = range(0).map(|x| self.index([x, y, z])).filter(|&i| !self.is_missing(frame, i));
+                row.for_each(|i| histogram.count(self.frames[frame][i]));
             }
         }
         let (low, high) = histogram.two_means(0.0)?;
@@ -103,6 +104,11 @@ impl Region {
         let dark = histogram.at_rank(low.count / 3);
         let bright = histogram.at_rank(low.count + 2 * high.count / 3);
         has_contrast.then_some([dark, bright])
+    }
+
+    /// Returns whether a voxel has no value, and the objects have none around them.
+    fn is_missing(&self, frame: usize, voxel: usize) -> bool {
+        self.has_background && self.frames[frame][voxel] == 0
     }
 
     /// Returns the voxel beyond `to` as seen from `from`, its neighbour along a direction; `None` outside of the region.

@@ -8,14 +8,14 @@ use crate::pauses::Pauses;
 use crate::warning::{Place, Warning, WarningCode};
 
 /// Largest accepted difference between the middles of the intensity steps at the surface in two frames of the same windows,
-/// in units of the step of one. The level between bright and dark is that of the window: at this difference it may be at
-/// a fifth of the step instead of half, a third of a voxel off where the image is blurred by one. With a smaller limit,
-/// frames of a cine sequence are warned of.
+/// in units of the step of one. Votes are by the level of the window, which at this difference may be at a fifth of the step
+/// instead of half; points are shifted by the levels of the frame, but by half a voxel at most. With a smaller limit, frames
+/// of a cine sequence are warned of.
 const MAX_SHIFT: f64 = 0.3;
 
 /// Thickness of the object, 2V/A with its volume V and area A as of a plate, in units of the radius of the plane fits, below which its
 /// volume is uncertain: planes fitted to half of a ball and more do not show its curvature. Of a ball it is ⅔ of the radius,
-/// and at this thickness errors are 5 %, as of plates and bars.
+/// and at this thickness its error is 5 %; of square bars half of their side, and errors are up to 8 % a little above it.
 const THIN: f64 = 0.93;
 
 /// Share of the vertices of a surface in the sides of the box, or near them, from which it is cut off there: fewer touch it.
@@ -131,10 +131,7 @@ impl SurfaceTracker {
             Finding { code, text, frames: frames.map(|(frame, _)| frame).collect() }
         };
         let handles = has_handles(self.cavity, self.is_ring());
-        // A surface that has taken in another object may hold it from then on.
-        let touched = self.facts.iter().position(|facts| facts.is_touched);
-        let since = touched.map_or(0..0, |first| first..self.facts.len());
-        let touched = since.filter(|&frame| self.has_object(frame)).collect();
+        let touched = self.touched_frames();
         [
             self.missing_boundary(),
             finding(WarningCode::TouchesBox, CUT_BY_BOX.into(), |facts| facts.is_cut),
@@ -144,6 +141,20 @@ impl SurfaceTracker {
         ]
     }
 
+    /// Returns the frames whose surface another object touches, or did before: it may hold that from then on, until it ends.
+    fn touched_frames(&self) -> Vec<usize> {
+        let mut is_touched = false;
+        let mut touched = Vec::new();
+        for (frame, facts) in self.facts.iter().enumerate() {
+            let goes_on = self.has_object(frame) && !self.lost.contains(&(frame as u32));
+            is_touched = facts.is_touched || is_touched && goes_on;
+            if is_touched {
+                touched.push(frame);
+            }
+        }
+        touched
+    }
+
     /// Finds the frames in which the image shows no boundary at much of the surface.
     fn missing_boundary(&self) -> Finding {
         let shares = self.statistics.iter().enumerate().map(|(frame, statistics)| {
@@ -151,10 +162,10 @@ impl SurfaceTracker {
             (frame, 2.0 * statistics.without_boundary as f64 / statistics.triangles.max(1) as f64)
         });
         let much: Vec<_> = shares.filter(|(_, share)| *share > WITHOUT_BOUNDARY).collect();
-        let percent = (100.0 * much.iter().map(|(_, share)| share.min(1.0)).fold(0.0, f64::max)) as u32;
+        let percent = 100.0 * WITHOUT_BOUNDARY;
         let text = format!(
-            "the image shows no boundary at up to {percent} % of the surface; it is a guess there: lower the edge threshold, \
-             or use another box"
+            "the image shows no boundary at more than {percent:.0} % of the surface; it is a guess there: lower the edge \
+             threshold, or use another box"
         );
         let frames = much.into_iter().map(|(frame, _)| frame).collect();
         Finding { code: WarningCode::NoBoundary, text, frames }
@@ -315,7 +326,7 @@ const TOUCHED: &str = "another object touches the one that is tracked, or did be
 
 fn has_handles(cavity: Cavity, is_ring: bool) -> String {
     if is_ring {
-        return "the surface has the same number of handles in all frames: that is right for a ring, but else noise, or \
+        return "the surface has as many handles as in all other frames: that is right for a ring, but else noise, or \
                 muscles that cross the object"
             .into();
     }

@@ -8,7 +8,7 @@ export type { Warning };
 export type Place = NonNullable<Warning['where']>;
 
 /** Kinds of which there may be several that are not about the same. */
-const SEVERAL: readonly string[] = ['reader', 'precision'];
+const SEVERAL: readonly string[] = ['reader', 'precision', 'parts'];
 
 /** Returns a text that is equal for two warnings with the same kind and place. */
 export function keyOf({ code, text: words, where }: Warning): string {

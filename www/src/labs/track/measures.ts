@@ -1,5 +1,5 @@
 import type { Unit } from '../../engine/protocol';
-import { cellOf, concerning, type Warning } from '../../engine/warnings';
+import { cellOf, type Warning } from '../../engine/warnings';
 import { csvOf } from '../../kit/csv';
 import { count, figure } from '../../kit/format';
 import type { ExtraMeasure } from '../../kit/measures';
@@ -105,25 +105,25 @@ function headOf(column: string, unit: Unit): string {
 
 /**
  * Returns the data of all tracked frames as CSV, one line per frame; lengths, areas and volumes in world units, which the
- * heads name if they are known. `truth` are the true volumes of the frames, if known. If there are warnings, a last column has the codes of those that concern
- * the frame.
+ * heads name if they are known. `truth` are the true volumes of the frames, if known. If there are warnings, those of each frame, a last column has their codes.
  */
 export function framesCsv(
   frames: readonly TrackedFrame[],
   truth: readonly number[] | undefined,
-  warnings: readonly Warning[] = [],
+  warnings: readonly (readonly Warning[])[] = [],
   unit: Unit = '',
 ): string {
   const known = frames.some(({ error }) => error);
   const ofError = known ? ['error', 'error (95 %)', 'true volume'] : [];
-  const names = ['frame', ...COLUMNS, 'self-intersections', ...ofError, ...(warnings.length > 0 ? ['warnings'] : [])];
+  const isWarned = warnings.some((list) => list.length > 0);
+  const names = ['frame', ...COLUMNS, 'self-intersections', ...ofError, ...(isWarned ? ['warnings'] : [])];
   const head = names.map((name) => headOf(name, unit));
   const lines = frames.map(({ facts, measures, error }, i) => [
     i + 1,
     ...COLUMNS.map((name) => facts[name as keyof typeof facts]),
     measures.report?.selfIntersections ?? '',
     ...(known ? [error?.mean ?? '', error?.p95 ?? '', truth?.[i] ?? ''] : []),
-    ...(warnings.length > 0 ? [cellOf(concerning(warnings, { frame: i }))] : []),
+    ...(isWarned ? [cellOf(warnings[i] ?? [])] : []),
   ]);
   return csvOf([head, ...lines]);
 }

@@ -4,6 +4,7 @@
  * As in the other labs: each request gets exactly one reply, the worker sends events of its own accord, and a
  * cancellation is not an error.
  */
+
 import type { FrameStatistics } from 'vesicle';
 import type {
   CodeRequests,
@@ -22,6 +23,7 @@ import type {
   VolumeView,
 } from '../../engine/protocol';
 import type { RunLog } from '../../engine/run-log';
+import type { Warning } from '../../engine/warnings';
 import type { CineSpec } from './cine';
 
 export type {
@@ -234,6 +236,8 @@ export interface Requests extends CodeRequests {
   /** Makes the worker send a state event, `done` or `paused`, to the page. */
   sendState: { body: undefined; reply: undefined };
   export: { body: ExportRequest & { frame: number }; reply: Uint8Array };
+  /** Replies with the warnings about each tracked frame, among them what is also true of others. */
+  frameWarnings: { body: undefined; reply: Warning[][] };
   /** Replies with all tracked frames as one animated GLB. */
   animation: { body: Pick<ExportRequest, 'space' | 'unit'>; reply: Uint8Array };
   /** Tracks all frames with another setup, for comparison; replies with undefined if cancelled. */

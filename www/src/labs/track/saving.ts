@@ -1,5 +1,5 @@
 import { zipSync } from 'three/addons/libs/fflate.module.js';
-import { concerning, type Warning } from '../../engine/warnings';
+import { merged, type Warning } from '../../engine/warnings';
 import type { SurfaceSpace } from '../../lab/surface-space';
 import type { TrackClient } from './client';
 import { framesCsv } from './measures';
@@ -17,29 +17,27 @@ export async function saveTrack(
   { frames, truth }: TrackResults,
 ): Promise<void> {
   const { saving, unit, warnings } = page;
-  const { all } = warnings;
-  if (what === 'table') saving.bytes('csv', new TextEncoder().encode(framesCsv(frames, truth, all, unit)), 'text/csv');
-  else if (what === 'animation')
+  // Frames have their own.
+  const general = warnings.all.filter(({ where }) => !(where && 'frame' in where));
+  if (what === 'table') {
+    const ofFrames = (await client.request('frameWarnings', undefined)).map((list) => merged(general, list));
+    saving.bytes('csv', new TextEncoder().encode(framesCsv(frames, truth, ofFrames, unit)), 'text/csv');
+  } else if (what === 'animation')
     saving.bytes('glb', await client.request('animation', surfaceSpace), 'model/gltf-binary');
-  else saving.bytes('zip', await archive(frames.length, client, surfaceSpace, all), 'application/zip');
+  else saving.bytes('zip', await archive(frames.length, client, surfaceSpace, general), 'application/zip');
 }
 
 async function archive(
   frames: number,
   client: TrackClient,
   space: SurfaceSpace,
-  all: readonly Warning[],
+  warnings: readonly Warning[],
 ): Promise<Uint8Array> {
   const files: Record<string, Uint8Array> = {};
   const digits = String(frames).length;
   for (let frame = 0; frame < frames; frame++) {
     const name = `frame-${String(frame + 1).padStart(digits, '0')}.ply`;
-    files[name] = await client.request('export', {
-      ...space,
-      frame,
-      format: 'ply',
-      warnings: concerning(all, { frame }),
-    });
+    files[name] = await client.request('export', { ...space, frame, format: 'ply', warnings });
   }
   // Fast compression: coordinates hardly compress anyway.
   return zipSync(files, { level: 1 });

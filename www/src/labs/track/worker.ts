@@ -8,6 +8,7 @@ import { logged, type RunLog, RunRecorder } from '../../engine/run-log';
 import { type Handlers, sender, serve, Work, withTransfer } from '../../engine/serving';
 import { transferOf } from '../../engine/surface-buffers';
 import { displayOf, intensitiesOf, viewOf } from '../../engine/volumes';
+import type { Warning } from '../../engine/warnings';
 import { text } from '../../texts';
 import { type CineSpec, trueVolume } from './cine';
 import { programOf } from './code';
@@ -90,6 +91,7 @@ class Session {
     view: () => this.#view(),
     sendState: () => this.#reportStopped(),
     export: (body) => this.#export(body),
+    frameWarnings: () => this.#frameWarnings(),
     animation: (frame) => this.#current().toGlb(frame),
     compare: ({ setup }) => this.#compare(setup),
     cancelCompare: () => this.#comparison.stop(),
@@ -343,6 +345,18 @@ class Session {
     const isTracked = frame < this.#current().statistics.length;
     const program = (setup: Setup) => programOf(setup, this.#image(), isTracked ? frame : undefined, stem);
     return toCode(this.#log.log, program, edits);
+  }
+
+  #frameWarnings(): Warning[][] {
+    const tracker = this.#current();
+    return tracker.statistics.map((_, frame) => {
+      const mesh = tracker.meshAt(frame);
+      try {
+        return [...mesh.warnings];
+      } finally {
+        mesh.free();
+      }
+    });
   }
 
   #export({ frame, format, ...options }: Requests['export']['body']): Uint8Array {
