@@ -13,8 +13,9 @@
 //! # Differences from the paper
 //! The first frame uses the distance from oriented points, because the distance from the plane (equation 6) has no sign
 //! away from them. The last projection of a frame is onto that frame's points alone, which are shifted from their faces
-//! to where intensities put the boundary (`shifts`), and the bias of fitted planes on curved surfaces is corrected. Where two walls meet, the sheet between them has no boundary any more and is
-//! collapsed. No move makes the surface intersect itself.
+//! to where intensities put the boundary (`shifts`), and the bias of fitted planes on curved surfaces is corrected.
+//! Where two walls meet, the sheet between them has no boundary any more and is collapsed. No move makes the surface
+//! intersect itself.
 
 mod boundary_loss;
 mod box_sides;

@@ -39,9 +39,8 @@ impl Region {
         shifts
     }
 
-    /// Returns the distance from the face after a voxel to where the row of voxels through it changes from bright to dark: it
-    /// is as far from the face as voxels of the row, two on either side, are bright beyond it. 0 in the sides of the box, beside
-    /// missing voxels, without contrast, and into what is a single voxel thick: both of its walls would be in its middle.
+    /// Returns the distance of the boundary from the face after a voxel, in the row of voxels across it. 0 in the sides of the
+    /// box, beside missing voxels, without contrast, and as [`crossing`] says.
     fn shift(&self, frame: usize, direction: usize, voxel: u32, half_width: usize) -> f32 {
         if self.outward_at_box_side(direction, voxel).is_some() {
             return 0.0;
@@ -59,24 +58,7 @@ impl Region {
             .map(|end| end.filter(|&at| !self.is_missing(frame, self.index(at))));
         let [first, last] = [ends[0].unwrap_or(here), ends[1].unwrap_or(there)].map(share);
         let [a, b] = [here, there].map(share);
-        if a == b {
-            return 0.0;
-        }
-        let falls = a > b;
-        // A voxel of another wall counts as the one before it.
-        let in_wall =
-            |near: f64, end: f64, toward: f64| if (end - near) * toward > OTHER_WALL { near } else { end };
-        let toward = if falls { 1.0 } else { -1.0 };
-        let ends = [in_wall(a, first, -toward), in_wall(b, last, toward)];
-        // Along an oblique row, or in a blurred image, brightness changes further than to its ends, but evenly.
-        let shift = if (ends[0] - ends[1]).abs() < SHARP {
-            (a - 0.5) / (a - b) - 0.5
-        } else {
-            toward * (ends[0] + a + b + ends[1] - 2.0)
-        };
-        let [before, within] = if shift > 0.0 { [a, last] } else { [b, first] };
-        let is_thin = (before > 0.5) == (within > 0.5);
-        if is_thin { 0.0 } else { shift.clamp(-MAX_SHIFT, MAX_SHIFT) as f32 }
+        crossing([first, a, b, last])
     }
 
     /// Returns the levels of dark and of bright voxels around the face after a voxel; `None` without contrast.
@@ -117,4 +99,27 @@ impl Region {
         next[direction] = (2 * to[direction]).checked_sub(from[direction])?;
         (next[direction] < self.dims[direction]).then_some(next)
     }
+}
+
+/// Returns where a row of four voxels changes from bright to dark, as the distance from the face in its middle: as far as
+/// voxels, two on either side, are bright beyond it. The row is given by the brightness of its voxels, from 0 for dark to 1 for
+/// bright. 0 without a change at the face, and into what is a single voxel thick: both of its walls would be in its middle.
+fn crossing([first, a, b, last]: [f64; 4]) -> f32 {
+    if a == b {
+        return 0.0;
+    }
+    let toward = if a > b { 1.0 } else { -1.0 };
+    // A voxel of another wall counts as the one before it.
+    let in_wall =
+        |near: f64, end: f64, toward: f64| if (end - near) * toward > OTHER_WALL { near } else { end };
+    let ends = [in_wall(a, first, -toward), in_wall(b, last, toward)];
+    // Along an oblique row, or in a blurred image, brightness changes further than to its ends, but evenly.
+    let shift = if (ends[0] - ends[1]).abs() < SHARP {
+        (a - 0.5) / (a - b) - 0.5
+    } else {
+        toward * (ends[0] + a + b + ends[1] - 2.0)
+    };
+    let [before, within] = if shift > 0.0 { [a, last] } else { [b, first] };
+    let is_thin = (before > 0.5) == (within > 0.5);
+    if is_thin { 0.0 } else { shift.clamp(-MAX_SHIFT, MAX_SHIFT) as f32 }
 }

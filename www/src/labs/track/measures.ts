@@ -105,7 +105,8 @@ function headOf(column: string, unit: Unit): string {
 
 /**
  * Returns the data of all tracked frames as CSV, one line per frame; lengths, areas and volumes in world units, which the
- * heads name if they are known. `truth` are the true volumes of the frames, if known. If there are warnings, those of each frame, a last column has their codes.
+ * heads name if they are known. `truth` are the true volumes of the frames, if known, and `warnings` lists those of each
+ * frame: if there are any, a last column has their codes.
  */
 export function framesCsv(
   frames: readonly TrackedFrame[],

@@ -4,7 +4,6 @@
  * As in the other labs: each request gets exactly one reply, the worker sends events of its own accord, and a
  * cancellation is not an error.
  */
-
 import type { FrameStatistics } from 'vesicle';
 import type {
   CodeRequests,
