@@ -32,6 +32,7 @@ mod derived;
 mod dice;
 mod enrich;
 mod error;
+mod fill_value;
 mod flow;
 mod frame_grid;
 mod grid;

@@ -8,7 +8,7 @@ use vesicle::math::{DAffine3, DVec3, Vec3};
 use vesicle::mesh::{Mesh, TriangleMesh, count_self_intersections, measure};
 use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{
-    Bounds, Cavity, Component, SurfaceTracker, TrackingLimits, TrackingOptions, TrackingParams,
+    Bounds, Cavity, Component, Query, SurfaceTracker, TrackingLimits, TrackingOptions, TrackingParams,
 };
 use vesicle::volume::{Volume, VolumeError, VolumeInit, Voxels};
 use vesicle::warning::{Place, WarningCode};
@@ -419,6 +419,24 @@ fn voxels_that_are_not_numbers_are_outside() {
         let tracker = tracked(options(volume)).unwrap();
         assert_volumes(&tracker, &[v, 0.0, v, v]);
         assert_eq!(told(&tracker), [(EndsInFrame, 1), (BeginsInFrame, 2)]);
+    }
+}
+
+#[test]
+fn a_field_of_view_beyond_which_there_are_no_values_is_no_boundary() {
+    let mut random = Random(8);
+    for fill in [f32::NAN, -2000.0, -32768.0, -1.0e10, 1.0e20] {
+        let volume = sequence([SIDE; 3], 3, DAffine3::IDENTITY, |_, p| {
+            let value = 20.0 + 130.0 * brightness(&[BALL], p) + random.within(0.0, 10.0) as f32;
+            if p.distance(BALL.center) > 9.0 { fill } else { value }
+        });
+        println!("{fill}");
+        let query = Query::Point { at: BALL.center, frame: 1 };
+        let proposal = SurfaceTracker::propose(&volume, query).unwrap();
+        assert!((50.0..120.0).contains(&proposal.threshold), "{}", proposal.threshold);
+        let tracker = tracked(options(volume)).unwrap();
+        assert_volumes(&tracker, &[size(BALL); 3]);
+        assert_eq!(told(&tracker), []);
     }
 }
 

@@ -1,7 +1,8 @@
 //! A sequence as bytes, with fewer voxels if there are many, to find an object in.
 
 use super::lattice::Lattice;
-use super::region::{BINS, MAX_LEVEL, bin_of, intensity_quantiles, noise_of};
+use super::missing::{self, Beside, Missing};
+use super::region::{BINS, MAX_LEVEL, count_values, intensity_quantiles, noise_of};
 use crate::math::DVec3;
 use crate::methods::MethodError;
 use crate::pauses::Pauses;
@@ -46,15 +47,25 @@ impl CoarseSequence {
         };
         let mut sequence =
             Self { lattice, first: ends[0], strides, frames: Vec::new(), quantum: 0.0, noise: 0.0 };
-        let mut counts = vec![0u64; BINS];
+        let (mut counts, mut lacks_values) = (vec![0u64; BINS], false);
         for frame in 0..volume.frames() {
             sequence
                 .for_each_layer(volume, frame, pauses, |layer| {
-                    layer.iter().for_each(|&value| counts[bin_of(value)] += 1);
+                    lacks_values |= count_values(layer, &mut counts)
                 })
                 .await?;
         }
-        let [from, to] = intensity_quantiles(&counts);
+        let range = intensity_quantiles(&counts);
+        let mut beside = Beside::new(range);
+        let read_again = if lacks_values { 0..volume.frames() } else { 0..0 };
+        for frame in read_again {
+            let mut values = Vec::with_capacity(lattice.len());
+            sequence.for_each_layer(volume, frame, pauses, |layer| values.extend(layer)).await?;
+            beside.add(&values, lattice.dims);
+        }
+        let missing = beside.missing();
+        let has_background = missing == Missing::Background;
+        let ([missing, from], to) = (missing.intensity(range), range[1]);
         if from >= to {
             return Err(MethodError::invalid(
                 "volume",
@@ -62,7 +73,10 @@ impl CoarseSequence {
             ));
         }
         let scale = MAX_LEVEL / (to - from);
-        let level = |value: f32| ((f64::from(value) - from) * scale + 0.5).clamp(0.0, MAX_LEVEL) as u8;
+        let level = |value: f32| {
+            let value = if value.is_nan() { missing } else { f64::from(value) };
+            ((value - from) * scale + 0.5).clamp(0.0, MAX_LEVEL) as u8
+        };
         for frame in 0..volume.frames() {
             let mut levels = Vec::with_capacity(lattice.len());
             sequence
@@ -74,11 +88,12 @@ impl CoarseSequence {
         }
         sequence.quantum = volume.span() / scale;
         let rows = sequence.frames.iter().flat_map(|frame| frame.chunks_exact(lattice.dims[0]));
-        sequence.noise = noise_of(rows, false);
+        sequence.noise = noise_of(rows, has_background);
         Ok(sequence)
     }
 
-    /// Calls `visit` with the voxels of each layer along z of a frame that are kept, in 0..1, the range of the volume.
+    /// Calls `visit` with the voxels of each layer along z of a frame that are kept, in 0..1, the range of the volume;
+    /// NaN for those without a value.
     async fn for_each_layer(
         &self,
         volume: &Volume,
@@ -93,7 +108,7 @@ impl CoarseSequence {
         let mut layer = Vec::with_capacity(nx * ny);
         for z in 0..nz {
             let min = [self.first[0], self.first[1], self.first[2] + z * sz];
-            let grid = volume.normalised_region(Region { min, dims }, frame)?;
+            let grid = missing::read(volume, Region { min, dims }, frame)?;
             layer.clear();
             for row in grid.values.chunks_exact(dims[0]).step_by(sy) {
                 layer.extend(row.iter().step_by(sx));

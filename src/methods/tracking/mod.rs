@@ -26,6 +26,7 @@ mod first;
 mod frame_tracker;
 mod labelling;
 mod lattice;
+mod missing;
 mod motion;
 mod neighbours;
 mod organ;
@@ -329,6 +330,7 @@ impl SurfaceTracker {
             return Err(MethodError::invalid("volume", problem));
         }
         let shortest_side = volume.spacing().into_iter().fold(f64::INFINITY, f64::min);
+        let volume = volume.without_fill_values(&pauses).await?;
         let region = Region::new(&volume, bounds, &pauses).await?;
         let noise = region.noise() * region.quantum;
         let image = ImageStatistics {

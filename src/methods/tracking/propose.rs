@@ -81,6 +81,7 @@ impl SurfaceTracker {
             return Err(MethodError::invalid("volume", "must have at least two frames, got one"));
         }
         let pauses = Pauses::default();
+        let volume = volume.without_fill_values(&pauses).await?;
         let last = volume.dims().map(|n| n - 1);
         let ends = match query {
             Query::Box(corners) => voxels_around(&volume, corners)?,

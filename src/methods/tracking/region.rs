@@ -1,12 +1,13 @@
 //! The region of a 4D image in which a surface is tracked, with its intensities quantised to one byte.
 
 use super::Bounds;
+use super::missing::{self, Beside, Missing};
 use super::vote::TIME;
 use super::working_space::WorkingSpace;
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::methods::MethodError;
 use crate::pauses::Pauses;
-use crate::volume::{Volume, Voxels, trilinear};
+use crate::volume::{self, Volume, trilinear};
 
 /// Highest quantised intensity: intensities are quantised to 0 to 254, one byte per voxel.
 pub(super) const MAX_LEVEL: f64 = 254.0;
@@ -17,14 +18,6 @@ const OUTLIERS: f64 = 1e-3;
 
 /// Number of bins of the histogram from which the range of intensities that is quantised is determined.
 pub(super) const BINS: usize = 4096;
-
-/// Share of the range of intensities up to which those next to voxels without a value are among the darkest: noise in a
-/// background reaches a tenth, and the values of an object without one are above it on average.
-const DARKEST: f64 = 0.25;
-
-/// Share of the mean intensity, above the least, from which those next to voxels without a value are typical of an object:
-/// the blurred rim of one, beyond which values are missing, is at a half.
-const TYPICAL: f64 = 0.7;
 
 /// Number of voxels that are added on every side of the processed box, so that windows around its outermost voxels
 /// extend beyond it.
@@ -128,26 +121,30 @@ impl Region {
 
     /// Quantises the intensities of all frames, between the quantiles found by [`intensity_quantiles`], to one byte.
     async fn read(&mut self, volume: &Volume, low: [usize; 3], pauses: &Pauses) -> Result<(), MethodError> {
-        let mut counts = vec![0u64; BINS];
+        let (mut counts, mut lacks_values) = (vec![0u64; BINS], false);
         for frame in 0..volume.frames() {
             pauses.now().await;
-            self.for_each_row(volume, low, frame, |row| {
-                row.iter().filter(|v| !v.is_nan()).for_each(|&v| counts[bin_of(v)] += 1);
-            })?;
+            self.for_each_row(volume, low, frame, |row| lacks_values |= count_values(row, &mut counts))?;
         }
-        let [mut from, to] = intensity_quantiles(&counts);
-        self.has_background = self.is_background_missing(volume, low, [from, to], pauses).await?;
-        if self.has_background {
-            // The step from the background to the darkest voxels is as large as all others together.
-            from -= if to > from { to - from } else { 1.0 };
+        let range = intensity_quantiles(&counts);
+        let mut beside = Beside::new(range);
+        let read_again = if lacks_values { 0..volume.frames() } else { 0..0 };
+        for frame in read_again {
+            pauses.now().await;
+            let mut values = Vec::with_capacity(self.dims.iter().product());
+            self.for_each_row(volume, low, frame, |row| values.extend(row))?;
+            beside.add(&values, self.dims);
         }
+        let missing = beside.missing();
+        self.has_background = missing == Missing::Background;
+        let ([missing, from], to) = (missing.intensity(range), range[1]);
         if from >= to {
             let problem = "all voxels in the box have the same intensity";
             return Err(MethodError::invalid("volume", problem));
         }
         let scale = MAX_LEVEL / (to - from);
         let level = |v: f32| {
-            let v = if v.is_nan() { f64::NEG_INFINITY } else { f64::from(v) };
+            let v = if v.is_nan() { missing } else { f64::from(v) };
             ((v - from) * scale + 0.5).clamp(0.0, MAX_LEVEL) as u8
         };
         for frame in 0..volume.frames() {
@@ -161,49 +158,6 @@ impl Region {
         Ok(())
     }
 
-    /// Returns whether voxels that are not numbers are the background of the objects, so that the step to them counts as a
-    /// boundary: those next to them are as bright as others. Next to a mask in the background of the image they are; there
-    /// the step counts for nothing. `range` are the quantiles of the other intensities.
-    async fn is_background_missing(
-        &self,
-        volume: &Volume,
-        low: [usize; 3],
-        [from, to]: [f64; 2],
-        pauses: &Pauses,
-    ) -> Result<bool, MethodError> {
-        if !is_float(volume) {
-            return Ok(false);
-        }
-        let [nx, ny, _] = self.dims;
-        let (mut sum, mut count) = (0.0, 0.0);
-        let (mut all, mut all_count) = (0.0, 0.0);
-        for frame in 0..volume.frames() {
-            pauses.now().await;
-            let mut values: Vec<f32> = Vec::with_capacity(self.dims.iter().product());
-            self.for_each_row(volume, low, frame, |row| values.extend(row))?;
-            if !values.iter().any(|value| value.is_nan()) {
-                continue;
-            }
-            for (i, &value) in values.iter().enumerate().filter(|(_, value)| !value.is_nan()) {
-                let at = self.voxel(i as u32);
-                let has_missing = (0..3).any(|k| {
-                    let step = [1, nx, nx * ny][k];
-                    at[k] > 0 && values[i - step].is_nan()
-                        || at[k] + 1 < self.dims[k] && values[i + step].is_nan()
-                });
-                if has_missing {
-                    (sum, count) = (sum + f64::from(value), count + 1.0);
-                }
-                (all, all_count) = (all + f64::from(value), all_count + 1.0);
-            }
-        }
-        if count == 0.0 || to <= from {
-            return Ok(count > 0.0);
-        }
-        let [beside, mean] = [sum / count, all / all_count].map(|mean| mean - from);
-        Ok(beside > DARKEST * (to - from) && beside > TYPICAL * mean)
-    }
-
     /// Calls `visit` with each row of the region along x in a frame, as intensities in 0..1, the range of the volume; NaN
     /// for those without a value.
     fn for_each_row(
@@ -213,15 +167,8 @@ impl Region {
         frame: usize,
         mut visit: impl FnMut(&[f32]),
     ) -> Result<(), MethodError> {
-        let mut grid = volume.normalised_grid(frame)?;
-        if is_float(volume) {
-            let start = frame * grid.values.len();
-            for (i, value) in grid.values.iter_mut().enumerate() {
-                if lacks_value(volume, start + i) {
-                    *value = f32::NAN;
-                }
-            }
-        }
+        let all = volume::Region { min: [0; 3], dims: volume.dims() };
+        let grid = missing::read(volume, all, frame)?;
         // Indices into the volume, clamped to its border.
         let along = |axis: usize| -> Vec<usize> {
             let (from, last) = (low[axis], grid.dims[axis] - 1);
@@ -326,17 +273,6 @@ pub(super) fn noise_of<'a>(rows: impl Iterator<Item = &'a [u8]>, has_background:
     median.max(0.0) / (0.674_49 * std::f64::consts::SQRT_2)
 }
 
-fn is_float(volume: &Volume) -> bool {
-    matches!(volume.voxels(), Voxels::F32(_) | Voxels::F64(_))
-}
-
-/// Returns whether a voxel has no value: NaN, or negative infinity.
-fn lacks_value(volume: &Volume, index: usize) -> bool {
-    let stored = volume.voxels().get(index).unwrap_or(f64::NAN);
-    let value = stored * volume.slope() + volume.intercept();
-    value.is_nan() || value == f64::NEG_INFINITY
-}
-
 fn check_size(dims: [usize; 3], frames: usize) -> Result<(), MethodError> {
     let voxels = dims.iter().fold(1u64, |product, &n| product.saturating_mul(n as u64));
     let bytes = voxels.saturating_mul(BYTES[0] + BYTES[1] * frames as u64);
@@ -361,9 +297,17 @@ pub(super) fn too_many_voxels([x, y, z]: [usize; 3], frames: usize) -> MethodErr
     MethodError::TooLarge { problem }
 }
 
-/// Returns the bin of an intensity, normalised to 0..1.
-pub(super) fn bin_of(value: f32) -> usize {
-    (value * (BINS - 1) as f32 + 0.5) as usize
+/// Counts intensities, normalised to 0..1, in [`BINS`], and returns whether any is missing.
+pub(super) fn count_values(values: &[f32], counts: &mut [u64]) -> bool {
+    let mut lacks_values = false;
+    for &value in values {
+        if value.is_nan() {
+            lacks_values = true;
+        } else {
+            counts[(value * (BINS - 1) as f32 + 0.5) as usize] += 1;
+        }
+    }
+    lacks_values
 }
 
 /// Returns the lower and upper quantile of the intensities, normalised to 0..1, beyond which voxels are outliers, from
