@@ -10,7 +10,7 @@ use vesicle::methods::Auto;
 use vesicle::methods::implicit::{
     Cloud, ImplicitOptions, ImplicitParams, ImplicitSurface, PointEdits, Sides,
 };
-use vesicle::warning::{Place, WarningCode};
+use vesicle::warning::{Place, Warning, WarningCode};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
 
@@ -113,6 +113,28 @@ fn a_gap_narrower_than_the_spacing_of_the_points_gives_a_warning() {
         let found = warnings.iter().filter(|one| one.code == WarningCode::ThinParts && is_there(&one.place));
         assert_eq!((found.count(), warnings.len()), if is_clear { (0, 0) } else { (1, 1) }, "{warnings:?}");
     }
+}
+
+/// A small ball beside a larger one, of so few points that the surface leaves it out: the warning names a point on it.
+#[test]
+fn parts_of_too_few_points_for_a_surface_give_a_warning() {
+    let middle = Vec3::X * 2.0;
+    let mut lost = 0;
+    for count in 2..10 {
+        let part = noisy(sphere, count, 0.0, 2).into_iter().map(|p| middle + 0.15 * p);
+        let mut surface = finished(noisy(sphere, 100, 0.0, 1).into_iter().chain(part).collect());
+        let warnings = surface.step().unwrap().warnings;
+        println!("{count}: {:?} {warnings:?}", euler_of_parts(surface.surface()));
+        if euler_of_parts(surface.surface()).len() == 1 {
+            let [Warning { code: WarningCode::ThinParts, place: Some(Place::Point(p)), .. }] = warnings[..]
+            else {
+                panic!("{count}: {warnings:?}")
+            };
+            assert!(DVec3::from(p).distance(middle.as_dvec3()) < 0.2, "{p:?}");
+            lost += 1;
+        }
+    }
+    assert!(lost > 0);
 }
 
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]

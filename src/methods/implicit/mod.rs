@@ -70,6 +70,7 @@ use crate::math::{DAffine3, DVec3, PositionIndex, Vec3};
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::pauses::{Computation, Pauses, advance, finished};
 use crate::remesh::Changes;
+use crate::spatial::PointGrid;
 use crate::warning::{Place, Warning, WarningCode};
 use automatic::OffSurfaceSearch;
 use cloud::{BoxMap, MAX_POINTS, MIN_POINTS};
@@ -132,10 +133,17 @@ const KEPT_BYTES: usize = 256 << 20;
 /// Rounding of the points, in their mean distance to the nearest neighbour, above which there is a warning.
 const COARSE_SHARE: f64 = 0.1;
 
+/// Distance of a point from the surface, in the distance between points and three times their noise, at which the surface does
+/// not follow it. Of the two furthest points near each other it is .5 at most on twelve shapes with 60 to 3,000 points and noise
+/// of 0 to .02 whose topology is right, and .8 to 2.5 where parts of two points and more are lost.
+const FAR: f64 = 0.7;
+
 const AMBIGUOUS: &str = "inside and outside are ambiguous: walls or gaps are about as thin as the spacing of the points or \
                          their noise; components, handles and volume may be wrong";
 const UNCLEAR: &str = "inside and outside are hardly distinguished here: a wall or gap is about as thin as the spacing of the \
                        points or their noise, and may be bridged or broken; components, handles and volume may be wrong";
+const UNREACHED: &str = "the surface is far from several points here: a part of the object, or a gap, that has so few points is lost, or \
+                         they are outliers; give more points or normals here, or remove them";
 const INWARD: &str =
     "the normals that were given point inwards on the whole: inside and outside are exchanged; reverse them";
 const COARSE: &str = "the points are rounded to single precision, which is coarse beside their spacing so far from the origin: \
@@ -182,6 +190,8 @@ pub struct ImplicitSurface {
     solver: Option<Box<Solver>>,
     /// Where the last finished surface separates inside and outside least clearly, if hardly.
     unclear: Option<Vec3>,
+    /// One of several points that the surface is far from.
+    unreached: Option<Vec3>,
     mesh: TriangleMesh,
     /// Counter of changes of the surface or its colours, so that callers know when to draw it again.
     version: u32,
@@ -340,6 +350,7 @@ impl ImplicitSurface {
             unedited: None,
             solver: None,
             unclear: None,
+            unreached: None,
             mesh: TriangleMesh::default(),
             version: 0,
             components: 0,
@@ -437,9 +448,35 @@ impl ImplicitSurface {
         if self.ambiguous_sides && self.params.sides != Sides::Outside {
             return Some(Warning::new(WarningCode::ThinParts, AMBIGUOUS));
         }
-        let unclear = self.unclear?;
-        let place = Place::Point((unclear.as_dvec3() + self.origin).to_array());
-        Some(Warning::at(WarningCode::ThinParts, place, UNCLEAR))
+        let found = self.unclear.map(|p| (p, UNCLEAR)).or(self.unreached.map(|p| (p, UNREACHED)));
+        let (point, text) = found?;
+        let place = Place::Point((point.as_dvec3() + self.origin).to_array());
+        Some(Warning::at(WarningCode::ThinParts, place, text))
+    }
+
+    /// Returns a point that a surface is far from, if another such point is near it: far beside their distance from each other
+    /// and their noise.
+    fn unreached_by(&self, mesh: &TriangleMesh) -> Option<Vec3> {
+        let Choice { density, noise, .. } = self.in_force();
+        let scale = self.map.scale();
+        let apart = 1.0 / density.sqrt() / scale;
+        let far = (FAR * (apart + 3.0 * noise / scale)).max(self.cell()) as f32;
+        if mesh.positions.is_empty() || !far.is_finite() {
+            return None;
+        }
+        let surface = PointGrid::of(&mesh.positions, far);
+        let mut points = self.map.all_in_world(&self.constraints.centres[..self.constraints.surface]);
+        points.retain(|&p| !surface.has_within(p, far));
+        let near = 2.0 * apart as f32;
+        let unreached = PointGrid::of(&points, near);
+        points.iter().copied().find(|&p| {
+            let mut count = 0;
+            unreached.within(p, near, |_, _| {
+                count += 1;
+                count < 2
+            });
+            count == 2
+        })
     }
 
     fn has_far_outliers(&self) -> bool {
@@ -742,6 +779,7 @@ impl ImplicitSurface {
     }
 
     fn take_mesh(&mut self, mesh: TriangleMesh) {
+        self.unreached = self.unreached_by(&mesh);
         let measures = measure_mesh(&mesh);
         (self.components, self.euler) = (measures.components as u32, measures.euler);
         self.mesh = TriangleMesh { origin: self.origin, ..mesh };
