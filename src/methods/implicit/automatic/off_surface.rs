@@ -1,5 +1,6 @@
 //! Points off the surface, on both sides of it, in slices of less than a tenth of a second of work.
 
+use super::FEW_POINTS;
 use super::quadric_fit::{QuadricFit, fitting_grid};
 use super::winding::Winding;
 use crate::math::Vec3;
@@ -25,8 +26,12 @@ const NOISE: f64 = 3.0;
 /// Least distance of a constraint from all points, as a share of its distance from the surface: a nearer one may be on the
 /// other side of another part.
 const CLEARANCE: f32 = 0.8;
+/// Offsets of pairs of few points whose normals are given, as shares of the usual one.
+const SHARES: [f32; 3] = [1.0, 0.5, 0.25];
 /// Least difference of the winding numbers of a pair; with less, it is ambiguous which end is inside.
 const LEAST_DIFFERENCE: f32 = 0.3;
+/// As [`LEAST_DIFFERENCE`] where a normal is given. On eight points of a ball it is about .2.
+const LEAST_GIVEN_DIFFERENCE: f32 = 0.15;
 /// Number of points where a pair is tried in a slice.
 const SLICE: usize = 60;
 /// Largest number of points outside that are compared with the winding number.
@@ -81,6 +86,8 @@ pub struct OffSurfaceSearch {
     width: f32,
     winding: Winding,
     iterations: usize,
+    /// The normals that were given with the points, if these are too few for the fits to show them.
+    given: Option<Vec<Vec3>>,
     /// Indices of the points where pairs are tried.
     at: Vec<u32>,
     found: OffSurface,
@@ -94,20 +101,26 @@ impl OffSurfaceSearch {
         let offset = (NOISE * choice.noise).max((OFFSET * spacing).min(MAX_OFFSET));
         let grid = fitting_grid(points, spacing);
         let chosen = subsampled(points, ORIENTED, seed);
+        let given = cloud.normals.as_ref().filter(|_| points.len() < FEW_POINTS);
         let fits = chosen.iter().map(|&i| {
             let p = points[i as usize];
+            if let Some(normals) = given {
+                return (p, normals[i as usize].normalize_or_zero());
+            }
             QuadricFit::of_wall(&grid, p).map_or((p, Vec3::ZERO), |fit| (fit.position, fit.normal))
         });
         let (positions, normals): (Vec<Vec3>, Vec<Vec3>) = fits.unzip();
         let area = (points.len() as f64 / choice.density / positions.len() as f64) as f32;
         let width = WIDTH * area.sqrt() + choice.noise as f32;
-        let given = |normals: &Vec<Vec3>| chosen.iter().map(|&i| normals[i as usize]).collect();
-        let vectors = cloud.normals.as_ref().map_or_else(|| vec![Vec3::ZERO; positions.len()], given);
+        let of_chosen = |normals: &Vec<Vec3>| chosen.iter().map(|&i| normals[i as usize]).collect();
+        let vectors = cloud.normals.as_ref().map_or_else(|| vec![Vec3::ZERO; positions.len()], of_chosen);
         let winding = Winding::new(&positions, vectors, width);
         let count = (points.len() / POINTS).max(MIN_PAIRS).min(points.len());
         let found = OffSurface { offset: offset as f32, ..OffSurface::default() };
         let at = subsampled(points, count, seed);
-        let mut search = Self { grid, positions, normals, area, width, winding, iterations: 0, at, found };
+        let given = given.cloned();
+        let mut search =
+            Self { grid, positions, normals, area, width, winding, iterations: 0, given, at, found };
         if cloud.normals.is_some() {
             search.iterations = ITERATIONS;
             search.orient();
@@ -155,25 +168,46 @@ impl OffSurfaceSearch {
         self.found.inconsistent = off.count() as f64 / self.positions.len() as f64;
     }
 
-    /// Tries a pair at a point: keeps an end where its side is unambiguous, and no point is near.
+    /// Tries a pair at a point.
     fn try_pair(&mut self, i: u32) {
         self.found.tried += 1;
         let p = self.grid.points()[i as usize];
-        let Some(fit) = QuadricFit::of_wall(&self.grid, p) else { return };
+        let [outside, inside] = match &self.given {
+            Some(normals) => self.given_pair(p, normals[i as usize]),
+            None => self.fitted_pair(p),
+        };
+        self.found.outside.extend(outside);
+        self.found.inside.extend(inside);
+    }
+
+    /// Returns the ends of the pair at a point, outside and inside: each where its side is unambiguous, and no point is near.
+    fn fitted_pair(&self, p: Vec3) -> [Option<Vec3>; 2] {
+        let Some(fit) = QuadricFit::of_wall(&self.grid, p) else { return [None; 2] };
         let step = fit.normal * self.found.offset;
         let ends = [fit.position + step, fit.position - step];
         let [a, b] = ends.map(|end| self.winding.at(end));
         if (a - b).abs() < LEAST_DIFFERENCE {
-            return;
+            return [None; 2];
         }
-        let [outside, inside] = if a < b { ends } else { [ends[1], ends[0]] };
-        let is_clear = |end: Vec3| !self.grid.has_within(end, CLEARANCE * self.found.offset);
-        if is_clear(outside) {
-            self.found.outside.push(outside);
-        }
-        if is_clear(inside) {
-            self.found.inside.push(inside);
-        }
+        let ends = if a < b { ends } else { [ends[1], ends[0]] };
+        ends.map(|end| self.is_clear(end, self.found.offset).then_some(end))
+    }
+
+    /// Returns the ends of the pair along a given normal, as far from the point as both are clear and on their sides.
+    fn given_pair(&self, p: Vec3, normal: Vec3) -> [Option<Vec3>; 2] {
+        let pair = SHARES.into_iter().find_map(|share| {
+            let offset = share * self.found.offset;
+            let step = normal.normalize_or_zero() * offset;
+            let ends = [p + step, p - step];
+            let [outside, inside] = ends.map(|end| self.winding.at(end));
+            let is_right = inside - outside >= LEAST_GIVEN_DIFFERENCE;
+            (is_right && ends.iter().all(|&end| self.is_clear(end, offset))).then_some(ends)
+        });
+        pair.map_or([None; 2], |ends| ends.map(Some))
+    }
+
+    fn is_clear(&self, end: Vec3, offset: f32) -> bool {
+        !self.grid.has_within(end, CLEARANCE * offset)
     }
 }
 
