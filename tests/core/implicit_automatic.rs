@@ -69,13 +69,13 @@ fn a_few_points_on_a_sphere_give_a_ball() {
 /// Normals that are given show how far a surface bulges between few points.
 #[test]
 fn a_few_points_with_normals_on_a_sphere_give_a_round_ball() {
-    let golden = PI * (3.0 - 5.0_f64.sqrt());
+    let golden = PI * (3.0 - libm::sqrt(5.0));
     for (count, tolerance) in [(8, 0.03), (12, 0.02), (20, 0.02), (50, 0.02)] {
         let points: Vec<Vec3> = (0..count)
             .map(|i| {
                 let (z, turn) = (1.0 - (2 * i + 1) as f64 / f64::from(count), golden * f64::from(i));
-                let radius = (1.0 - z * z).sqrt();
-                DVec3::new(radius * turn.cos(), radius * turn.sin(), z).as_vec3()
+                let radius = libm::sqrt(1.0 - z * z);
+                DVec3::new(radius * libm::cos(turn), radius * libm::sin(turn), z).as_vec3()
             })
             .collect();
         let mut surface = begun(Cloud { normals: Some(points.clone()), points, ..Cloud::default() });

@@ -11,7 +11,7 @@ const DARKEST: f64 = 0.25;
 /// the blurred rim of one, beyond which values are missing, is at a half.
 const TYPICAL: f64 = 0.7;
 
-/// What voxels without a value are. None of them is in an object.
+/// The meaning of voxels without a value. None of them is in an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Missing {
     /// The background of the objects: those next to them are as bright as others, and the step to them is a boundary.
