@@ -461,7 +461,9 @@ impl ImplicitSurface {
         let scale = self.map.scale();
         let apart = 1.0 / density.sqrt() / scale;
         let far = (FAR * (apart + 3.0 * noise / scale)).max(self.cell()) as f32;
-        if mesh.positions.is_empty() || !far.is_finite() {
+        // With a λ that was given, a surface is as far from the points as λ says.
+        let is_chosen = self.params.lambda_surface.given().is_none();
+        if !is_chosen || mesh.positions.is_empty() || !far.is_finite() {
             return None;
         }
         let surface = PointGrid::of(&mesh.positions, far);
