@@ -129,7 +129,7 @@ const GROUPS = [
       ['app types', check(tool('tsc'), ['--noEmit', '-p', at('www')]), 20],
       ['app build', works(buildApp), 25],
       ['app test types', check(tool('tsc'), ['--noEmit', '-p', at('tests/app')]), 15],
-      ['app', vitest('tests/app', '--project=together', SHORT), 450],
+      ['app', vitest('tests/app', '--project=units', '--project=together', SHORT), 450],
     ],
   ],
   [[['app alone', vitest('tests/app', '--project=alone', SHORT), 100]]],
@@ -154,7 +154,7 @@ const LONG = [
       ['whole build', works(build), 500],
       ['package more', vitest('tests/js', LONG_ONES), 100],
       ['app long', vitest('tests/app', '--project=long'), 600],
-      ['app more', vitest('tests/app', '--project=together', LONG_ONES), 900],
+      ['app more', vitest('tests/app', '--project=units', '--project=together', LONG_ONES), 900],
       // The runner runs ignored tests only with all others.
       [
         'slow wasm',

@@ -1,6 +1,6 @@
 import type { Browser } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
-import { type App, LABS, open, openApp, overflow, QUICK, reach, unfold } from './browser';
+import { type App, LABS, open, openApp, overflow, QUICK, RUNNING, reach, unfold } from './browser';
 import { inOneLab, LONG } from './long';
 
 let app: App;
@@ -107,7 +107,7 @@ for (const lab of LABS) {
       expect(untold).toEqual([]);
     });
 
-    test.skipIf(['track', 'segment'].includes(lab))('has the numbers of its plots in a table', async () => {
+    test.runIf(RUNNING.includes(lab) && lab !== 'track')('has the numbers of its plots in a table', async () => {
       const table = app.page.locator('[data-plot-table]');
       const last = table.locator('tbody tr:not([hidden])').last();
       await expect.poll(() => last.locator('th').textContent()).toMatch(/^\d/);

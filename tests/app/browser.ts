@@ -5,6 +5,7 @@ import { expect } from 'vitest';
 import { launchChromium } from '../../scripts/chromium.mjs';
 import { serveApp } from '../../scripts/serve.mjs';
 import { at } from '../../scripts/shell.mjs';
+import type { LabId } from '../../www/src/lab/address';
 
 /** Timeout in milliseconds for anything on the page. */
 const PATIENCE = 120_000;
@@ -18,14 +19,16 @@ export interface App {
 }
 
 /** The labs, each with the address of a fast example. */
-export const QUICK = {
+export const QUICK: Record<LabId, string> = {
   extract: 'extract?example=linked-rings',
   reconstruct: 'reconstruct?example=two-balls',
   track: 'track?example=ventricle',
   sculpt: 'sculpt?example=globe',
   segment: 'segment?example=ovule',
 };
-export const LABS = Object.keys(QUICK) as (keyof typeof QUICK)[];
+export const LABS = Object.keys(QUICK) as LabId[];
+/** The labs whose model runs: their pages have Play and Step. */
+export const RUNNING: readonly LabId[] = LABS.filter((lab) => lab !== 'segment');
 
 /**
  * Launches a browser, which the caller closes. It composes pages without WebGL: with WebGL in software, composing the

@@ -4,6 +4,7 @@ import { readdir, readFile } from 'node:fs/promises';
 import { dirname, join, relative } from 'node:path';
 import { beforeAll, expect, test } from 'vitest';
 import { at } from '../../scripts/shell.mjs';
+import type { LabId } from '../../www/src/lab/address';
 import { exampleById } from '../../www/src/labs/extract/presets';
 import { cloudById } from '../../www/src/labs/reconstruct/presets';
 import { sceneById } from '../../www/src/labs/sculpt/presets';
@@ -11,13 +12,15 @@ import { segmentExampleById } from '../../www/src/labs/segment/examples';
 import { imageById } from '../../www/src/labs/track/presets';
 
 const DOCS = at('dist/docs');
-const LABS: Record<string, (id: string) => { id: string } | undefined> = {
+const LABS: Record<LabId, (id: string) => { id: string } | undefined> = {
   extract: exampleById,
   reconstruct: cloudById,
   sculpt: sceneById,
   track: imageById,
   segment: segmentExampleById,
 };
+/** Returns the id of a lab's example; undefined if it has none of that name. */
+const exampleOf = (lab: string, id: string) => (lab in LABS ? LABS[lab as LabId](id)?.id : undefined);
 
 interface Link {
   page: string;
@@ -68,7 +71,7 @@ test('every method has a page, and its examples exist in the lab', () => {
     const [lab = '', query] = hash.split('?');
     labs.add(lab);
     const id = new URLSearchParams(query).get('example');
-    if (id) examples.push(`${lab} ${LABS[lab]?.(id)?.id === id ? id : 'has none of that name'}`);
+    if (id) examples.push(`${lab} ${exampleOf(lab, id) === id ? id : 'has none of that name'}`);
   }
   expect([...labs].sort()).toEqual(Object.keys(LABS).sort());
   expect(examples.length).toBeGreaterThan(9);
@@ -84,7 +87,7 @@ test('every example that a test opens exists, except those that a test says do n
     const text = await readFile(join(folder, source), 'utf8');
     for (const [, lab = '', id = ''] of text.matchAll(/\b(\w+)\?(?:[^'"`\s]*&)?example=([\w-]+)/g))
       if (id !== 'nowhere' && lab in LABS)
-        opened.push(`${source}: ${lab} ${LABS[lab]?.(id)?.id === id ? id : 'has none'}`);
+        opened.push(`${source}: ${lab} ${exampleOf(lab, id) === id ? id : 'has none'}`);
   }
   expect(opened.length).toBeGreaterThan(40);
   expect(opened.filter((one) => one.endsWith('none'))).toEqual([]);

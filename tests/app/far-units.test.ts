@@ -7,14 +7,18 @@ import { originOf, placed, relativeTo, shortened } from '../../www/src/engine/pl
 import type { Surface, Vec3 } from '../../www/src/engine/protocol';
 import { fileOf } from '../../www/src/engine/volumes';
 import { place } from '../../www/src/kit/format';
+import { initialOptions } from '../../www/src/kit/view';
 import { fromHash, linkOf, toHash } from '../../www/src/labs/extract/link';
+import { EXTRACT_VIEW } from '../../www/src/labs/extract/view';
 import * as cloudLink from '../../www/src/labs/reconstruct/link';
 import { applyEdits } from '../../www/src/labs/reconstruct/model';
 import { distances } from '../../www/src/labs/reconstruct/nearest';
+import { CLOUD_VIEW } from '../../www/src/labs/reconstruct/view';
 import { deformSurface } from '../../www/src/labs/sculpt/deform';
 import { ball, moved } from '../../www/src/labs/sculpt/ellipsoids';
 import { fitted } from '../../www/src/labs/sculpt/fit';
 import * as sculptLink from '../../www/src/labs/sculpt/link';
+import { SCULPT_VIEW } from '../../www/src/labs/sculpt/view';
 import { toGlb } from '../../www/src/labs/segment/glb';
 import { regionEdges } from '../../www/src/labs/track/region';
 import { votesNear } from '../../www/src/labs/track/votes';
@@ -192,14 +196,21 @@ describe('coordinates as text', () => {
     const clicked = add(FAR, [0.000123456, 0.25, -0.25]);
     const cloud = {
       ...{ example: undefined, file: 'survey.xyz', choice: { maxPoints: undefined, keepComponents: undefined } },
-      ...{ params: {}, defaults: {}, size: 17, color: 'plain' as const, photo: undefined },
+      ...{ params: {}, defaults: {}, size: 17, view: initialOptions(CLOUD_VIEW), photo: undefined },
     };
     const edits = { added: [clicked], removed: [3], outside: [FAR] };
     const read = cloudLink.fromHash(cloudLink.toHash(cloudLink.linkOf({ ...cloud, edits })));
     expect(off(read?.edits.added.flat() ?? [], clicked)).toBeLessThan(1e-5);
     expect(read?.edits.outside).toEqual([FAR]);
     const settings = {
-      ...{ example: undefined, file: 'survey.nrrd', frame: 0, params: {}, defaults: {}, color: 'plain' as const },
+      ...{
+        example: undefined,
+        file: 'survey.nrrd',
+        frame: 0,
+        params: {},
+        defaults: {},
+        view: initialOptions(EXTRACT_VIEW),
+      },
       choice: { kind: 'sphere', bubbles: 5, levels: 1, edge: undefined } as const,
       sphere: { center: clicked, radius: 1 },
       attractors: [{ point: FAR, strength: 0.1, radius: 2 }],
@@ -212,7 +223,7 @@ describe('coordinates as text', () => {
       ...{ example: undefined, file: 'house.obj', params: {}, usual: {}, film: undefined },
       ...{ support: 'membrane' as const, start: [] },
     };
-    const hash = sculptLink.toHash(sculptLink.linkOf({ ...scene, pose, color: 'plain', layout: 'result' }));
+    const hash = sculptLink.toHash(sculptLink.linkOf({ ...scene, pose, view: initialOptions(SCULPT_VIEW) }));
     expect(off(sculptLink.fromHash(hash)?.pose?.[0]?.center ?? [], clicked)).toBeLessThan(1e-3);
   });
 });

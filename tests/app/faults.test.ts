@@ -12,6 +12,7 @@ import {
   open,
   openApp,
   QUICK,
+  RUNNING,
   reach,
   recordStates,
 } from './browser';
@@ -118,7 +119,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     await reach(page, 'done');
     expect(await banner().filter({ visible: true }).allTextContents()).toEqual([]);
     // It has no run to reset.
-    if (lab === 'segment') return;
+    if (!RUNNING.includes(lab)) return;
     await page.locator('canvas[tabindex]').first().press('r');
     await expect.poll(() => iteration(page)).toBe(0);
     await reach(page, 'paused');
@@ -147,12 +148,12 @@ describe.each(LABS)('the %s lab', (lab) => {
     });
     await reach(page, 'done');
     expect(await page.textContent('.view-note')).toContain('needs WebGL 2');
-    if (lab !== 'segment') expect(await measures(page)).toMatchObject({ closed: true });
+    if (RUNNING.includes(lab)) expect(await measures(page)).toMatchObject({ closed: true });
     await page.locator('canvas[tabindex]').first().press('ArrowLeft');
   });
 
   // Segment, whose surfaces follow strokes alone, has a test of its own.
-  test.skipIf(lab === 'segment')(
+  test.runIf(RUNNING.includes(lab))(
     'keeps the last surface when its worker crashes during a run, and restarts',
     inOneLab(lab),
     async () => {
@@ -191,7 +192,7 @@ describe.each(LABS)('the %s lab', (lab) => {
     },
   );
 
-  test.skipIf(lab === 'segment')(
+  test.runIf(RUNNING.includes(lab))(
     'continues or pauses in a hidden tab, and shows everything when it becomes visible',
     LONG,
     async () => {

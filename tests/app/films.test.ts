@@ -2,7 +2,7 @@
 import { readFile } from 'node:fs/promises';
 import type { Page } from 'playwright-core';
 import { afterAll, afterEach, beforeAll, describe, expect, test } from 'vitest';
-import { type App, anotherPage, LABS, open, openApp, QUICK, reach } from './browser';
+import { type App, anotherPage, open, openApp, QUICK, RUNNING, reach } from './browser';
 import { LONG } from './long';
 
 let app: App;
@@ -227,7 +227,7 @@ describe('a plot', () => {
     expect(iterations).toBe(`Iteration ${curves[0]}`);
   });
 
-  describe.each(LABS.filter((lab) => lab !== 'segment'))('in the %s lab', (lab) => {
+  describe.each(RUNNING)('in the %s lab', (lab) => {
     test('each has a button that saves it', LONG, async () => {
       const page = await anotherPage(app);
       await open({ page, address: app.address }, QUICK[lab]);

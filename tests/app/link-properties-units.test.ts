@@ -1,16 +1,18 @@
 /** Links to all labs, whatever is in them: settings within bounds, or an error in words. */
 import fc from 'fast-check';
 import { describe, expect, test } from 'vitest';
+import type { LabId } from '../../www/src/lab/address';
 import { LinkError } from '../../www/src/lab/link-query';
 import * as extract from '../../www/src/labs/extract/link';
 import * as reconstruct from '../../www/src/labs/reconstruct/link';
 import * as sculpt from '../../www/src/labs/sculpt/link';
 import * as segment from '../../www/src/labs/segment/link';
 import * as track from '../../www/src/labs/track/link';
+import { optionsOf, VIEWS } from './made-views';
 
 const numRuns = Number(process.env.PROPERTY_RUNS ?? 500);
 
-const LABS = { extract, reconstruct, sculpt, segment, track };
+const LABS = { extract, reconstruct, sculpt, segment, track } satisfies Record<LabId, unknown>;
 const NAMES = [
   ...['example', 'file', 'start', 'frame', 'bubbles', 'levels', 'edge', 'sphere', 'attractor', 'color', 'v', 'p.iso'],
   ...['maxPoints', 'keepComponents', 'photo', 'add', 'outside', 'remove', 'pose', 'key', 'between', 'loop', 'layout'],
@@ -86,14 +88,39 @@ test('settings that a link contains are read as they were', () => {
         fc.oneof(finite, fc.constantFrom('euler', 'a=b&c')),
         { minKeys: 1 },
       ),
+      view: fc.constant({}),
       attractors: fc.array(fc.record({ point, strength: finite, radius: finite }), { maxLength: 9 }),
     },
-    { requiredKeys: ['params', 'attractors'] },
+    { requiredKeys: ['params', 'attractors', 'view'] },
   );
   const read = (settings: extract.Linked) => {
     expect(extract.fromHash(extract.toHash(settings))).toEqual(settings);
   };
   fc.assert(fc.property(linked, read), { numRuns });
+});
+
+/** Each lab's link with nothing but options of its view, to an example. */
+const VIEWED = {
+  extract: (view: object) => extract.toHash({ example: 'tooth', params: {}, attractors: [], view }),
+  reconstruct: (view: object) =>
+    reconstruct.toHash({ example: 'torus', params: {}, edits: { added: [], removed: [], outside: [] }, view }),
+  sculpt: (view: object) => sculpt.toHash({ example: 'lava', params: {}, view }),
+  segment: (view: object) => segment.toHash({ example: 'head', params: {}, view }),
+  track: (view: object) => track.toHash({ example: 'heart', params: {}, preparation: {}, view }),
+};
+
+test.each(Object.entries(VIEWED))('the options of the view of %s are read as they were', (id, hashOf) => {
+  const lab = id as keyof typeof VIEWED;
+  const read = (view: object) => {
+    expect(LABS[lab].fromHash(hashOf(view))?.view).toEqual(view);
+  };
+  fc.assert(fc.property<[object]>(optionsOf(VIEWS[lab]), read), { numRuns });
+});
+
+test('a value that an option of the view does not have is named', () => {
+  expect(segment.fromHash('#segment?opacity=1.5&slices=upright&edges=true')).toMatchObject({
+    ...{ view: { edges: true }, unread: ['slices=upright', 'opacity=1.5'] },
+  });
 });
 
 test('a link of too many characters is refused', () => {
@@ -106,7 +133,7 @@ test('a link with more attractors than any that the app makes is refused', () =>
   expect(() => extract.fromHash(hash)).toThrow('at most 100 of “attractor”, this one 101');
   const attractors = Array.from({ length: 101 }, () => ({ point: [1, 2, 3], strength: 4, radius: 5 }));
   const choice = { kind: 'contour', levels: 1 } as never;
-  const settings = { example: undefined, file: 'a.nrrd', frame: 0, choice, params: {}, defaults: {}, color: 'plain' };
+  const settings = { example: undefined, file: 'a.nrrd', frame: 0, choice, params: {}, defaults: {}, view: {} };
   const linked = extract.linkOf({ ...settings, attractors } as never);
   expect(linked.attractors).toEqual([]);
 });

@@ -1,7 +1,9 @@
 /** Random sessions of all labs, as the app could have made them. */
 import fc, { type Arbitrary } from 'fast-check';
 import { shortName } from '../../www/src/engine/labels';
+import type { LabId } from '../../www/src/lab/address';
 import type { NewSession, SourceFile } from '../../www/src/lab/session/file';
+import { optionsOf, VIEWS } from './made-views';
 
 const { constantFrom, nat, record, tuple } = fc;
 const flag = fc.boolean();
@@ -36,7 +38,6 @@ const report = record({
 const reports = fc.array(list(report), { minLength: 1, maxLength: 2 });
 const history = record({ list: fc.constant(0), iteration: count });
 const camera = record({ position: vec3, target: vec3 });
-const slices = constantFrom('walls', 'in place', 'hidden');
 
 const edit = fc.oneof(
   record({ op: fc.constant('remesh'), min: real, max: real }),
@@ -71,13 +72,9 @@ const moment = {
     ...{ params, attractors, history },
   }),
 };
-const color = constantFrom('plain', 'component', 'mean curvature');
 const extract = record({
   ...{ ...common, ...moment, undo: undoable(moment), redo: undoable(moment), reports },
-  view: record({
-    ...{ camera, crosshair: vec3 },
-    options: record({ surface: flag, edges: flag, color, slices }),
-  }),
+  view: record({ camera, crosshair: vec3, options: optionsOf(VIEWS.extract) }),
 });
 
 const edits = record({ added: list(vec3), removed: list(count), outside: list(vec3) });
@@ -88,10 +85,7 @@ const cloudLog = logOf(cloud, ['setParams', params], ['setEdits', edits]);
 const reconstruct = record({
   ...{ ...common, state: bytes, undo: undoable(settings), redo: undoable(settings), reports },
   model: record({ setup: cloud, last: maybe(report), log: cloudLog }),
-  view: record({
-    camera,
-    options: record({ surface: flag, edges: flag, points: flag, constraints: flag, cameras: flag, color }),
-  }),
+  view: record({ camera, options: optionsOf(VIEWS.reconstruct) }),
 });
 
 const pose = list(record({ center: vec3, axes: tuple(vec3, vec3, vec3) }), 2);
@@ -111,10 +105,7 @@ const posed = {
 const sculpt = record({
   ...{ ...common, ...posed, undo: undoable(posed), redo: undoable(posed), reports, params },
   log: logOf(record({ start: pose, params }), ['setParams', params], ['setEllipsoids', pose]),
-  view: record({
-    camera,
-    options: record({ layout: constantFrom('result', 'row'), edges: flag, ellipsoids: flag, color }),
-  }),
+  view: record({ camera, options: optionsOf(VIEWS.sculpt) }),
 });
 
 const preparation = record({
@@ -148,13 +139,7 @@ const frame = record({ surface, facts, measures: record({ info }), error: maybe(
 const track = record({
   ...{ ...common, ...tracked, undo: undoable(tracked), redo: undoable(tracked), reports },
   frames: fc.array(frame, { minLength: 1, maxLength: 2 }),
-  view: record({
-    ...{ camera, crosshair: vec3, frame: count },
-    options: record({
-      ...{ surface: flag, edges: flag, votes: constantFrom('none', 'all'), region: flag, slices },
-      below: constantFrom('slices', 'time'),
-    }),
-  }),
+  view: record({ camera, crosshair: vec3, frame: count, options: optionsOf(VIEWS.track) }),
 });
 
 const label = record({ value: fc.integer({ min: 1, max: 255 }), name, color: fc.stringMatching(/^#[0-9a-f]{6}$/) });
@@ -168,10 +153,7 @@ const segment = fc.uniqueArray(label, { minLength: 1, maxLength: 4, selector: ({
       ...{ tool: constantFrom('brush', 'fill'), shape: constantFrom('ball', 'disc'), extent: fc.constant('box') },
       ...{ radius: real, range: ordered, reach: real, inRange: flag, protect: flag },
     }),
-    view: record({
-      ...{ camera, crosshair: vec3 },
-      options: record({ edges: flag, outlines: flag, slices, opacity: fc.double({ min: 0, max: 1, noNaN: true }) }),
-    }),
+    view: record({ camera, crosshair: vec3, options: optionsOf(VIEWS.segment) }),
   }),
 );
 
@@ -180,7 +162,7 @@ const file: Arbitrary<SourceFile> = record({
   notes: maybe(record({ warnings: list(warning, 2), remarks: maybe(list(words(20))) })),
 });
 const source: Arbitrary<NewSession['source']> = record({ name, example: maybe(words(20)), files: list(file, 2) });
-const contents = { extract, reconstruct, sculpt, track, segment };
+const contents = { extract, reconstruct, sculpt, track, segment } satisfies Record<LabId, unknown>;
 
 /** A session of any of the labs. */
 export const anySession: Arbitrary<NewSession> = fc.oneof(

@@ -1,7 +1,7 @@
 /** Links and sessions of the Reconstruct lab from before parameters were chosen from the points. */
 import { expect, test } from 'vitest';
 import { completed } from '../../www/src/labs/reconstruct/before';
-import { CLOUDS, PAPER } from '../../www/src/labs/reconstruct/examples';
+import { CLOUDS, PAPER, viewOf } from '../../www/src/labs/reconstruct/examples';
 import { fromHash, linkOf, toHash } from '../../www/src/labs/reconstruct/link';
 import type { ParamValues } from '../../www/src/labs/reconstruct/protocol';
 import type { ReconstructContent } from '../../www/src/labs/reconstruct/schema';
@@ -26,7 +26,7 @@ test('a new link to a file leads to the same parameters', () => {
   const usual = { example: undefined, file: 'a.xyz', choice, defaults, edits: NONE, size: 1 };
   for (const changed of [{}, PAPER, { lambdaSurface: 0.004 }]) {
     const params: ParamValues = { ...defaults, ...changed };
-    const hash = toHash(linkOf({ ...usual, params, color: 'plain', photo: undefined }));
+    const hash = toHash(linkOf({ ...usual, params, view: viewOf(undefined), photo: undefined }));
     expect({ ...defaults, ...fromHash(hash)?.params }).toEqual(params);
   }
 });

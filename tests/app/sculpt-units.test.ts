@@ -16,7 +16,7 @@ import {
   turnedAbout,
   upright,
 } from '../../www/src/labs/sculpt/ellipsoids';
-import { SCENES } from '../../www/src/labs/sculpt/examples';
+import { SCENES, viewOf } from '../../www/src/labs/sculpt/examples';
 import { type Film, lastFrame, poseAt } from '../../www/src/labs/sculpt/film';
 import { fitted, principalAxes } from '../../www/src/labs/sculpt/fit';
 import { filmOf, fromHash, linkOf, toHash } from '../../www/src/labs/sculpt/link';
@@ -123,8 +123,7 @@ describe('links', () => {
       file: '',
       usual: { smoothing: 10 },
       params: { smoothing: 10 },
-      color: 'plain' as const,
-      layout: 'result' as const,
+      view: viewOf(undefined),
     },
     ...{ support: 'membrane' as const, start: [] },
   };
@@ -153,14 +152,14 @@ describe('links', () => {
     const linked = fromHash(toHash(linkOf({ ...surface, pose: [moved(LONG, [1, 0, 0])] })));
     expect(linked).toMatchObject({ support: 'surface', rest: [LONG], pose: [moved(LONG, [1, 0, 0])] });
     expect(fromHash('#sculpt?file=cow.obj&support=pillar')).toEqual({
-      ...{ params: {}, file: 'cow.obj' },
+      ...{ params: {}, file: 'cow.obj', view: {} },
       unread: ['support=pillar'],
     });
   });
 
   test('with invalid parts are read as far as possible', () => {
     expect(fromHash('#sculpt?pose=1,2;3&key=x&between=-4&layout=row')).toEqual({
-      ...{ params: {}, layout: 'row' },
+      ...{ params: {}, view: { layout: 'row' } },
       unread: ['between=-4', 'pose=1,2;3', 'key=x'],
     });
     expect(fromHash('#extract?example=bust')).toBeUndefined();

@@ -5,17 +5,19 @@ import init, { Volume } from '../../pkg/index.js';
 import type { LabelArray } from '../../www/src/engine/labels';
 import { freeValue, newLabel, rangeOf, rgbOf } from '../../www/src/engine/labels';
 import { withLabels } from '../../www/src/engine/slicer';
+import { initialOptions } from '../../www/src/kit/view';
 import { UndoStack } from '../../www/src/lab/undo';
 import { flood, floodBox, sweep } from '../../www/src/labs/segment/brush';
 import { SegmentEditing } from '../../www/src/labs/segment/editing';
 import { SEGMENT_EXAMPLES } from '../../www/src/labs/segment/examples';
 import { LabelMap } from '../../www/src/labs/segment/label-map';
 import { labelHead, labelTooth } from '../../www/src/labs/segment/labelling';
-import { fromHash, INITIAL_VIEW, linkOf, toHash } from '../../www/src/labs/segment/link';
+import { fromHash, linkOf, toHash } from '../../www/src/labs/segment/link';
 import type { ToolSettings } from '../../www/src/labs/segment/panels/tools';
 import type { Vec3 } from '../../www/src/labs/segment/protocol';
 import { boxOf, grown, union } from '../../www/src/labs/segment/region';
 import { openImage } from '../../www/src/labs/segment/source';
+import { SEGMENT_VIEW } from '../../www/src/labs/segment/view';
 
 const DIMS: Vec3 = [9, 7, 5];
 const COUNT = DIMS[0] * DIMS[1] * DIMS[2];
@@ -221,14 +223,14 @@ test('links contain what differs from the defaults, and are parsed again', () =>
     file: '',
     params: { smoothing: 5, edge: 1 },
     defaults,
-    view: { ...INITIAL_VIEW, opacity: 0.8 },
+    view: { ...initialOptions(SEGMENT_VIEW), opacity: 0.8 },
   };
   const hash = toHash(linkOf(settings));
   expect(hash).toBe('#segment?example=head&opacity=0.8&p.smoothing=5');
   expect(fromHash(hash)).toEqual({ example: 'head', params: { smoothing: 5 }, view: { opacity: 0.8 } });
-  expect(toHash(linkOf({ ...settings, example: SEGMENT_EXAMPLES[0], params: defaults, view: INITIAL_VIEW }))).toBe(
-    '#segment',
-  );
+  expect(
+    toHash(linkOf({ ...settings, example: SEGMENT_EXAMPLES[0], params: defaults, view: initialOptions(SEGMENT_VIEW) })),
+  ).toBe('#segment');
   expect(fromHash('#track?example=x')).toBeUndefined();
 });
 

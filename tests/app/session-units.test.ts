@@ -113,6 +113,11 @@ test('a session that the page takes up at once is refused if it has more than la
   }
 });
 
+test('a session without an option of the view, which was declared later, has its initial value', async () => {
+  const { content } = await readSession(await withView({ options: { surface: false } }));
+  expect(content).toMatchObject({ view: { options: { ...OPTIONS, surface: false } } });
+});
+
 test('long names are cut', async () => {
   const bytes = await withIndex((index) => Object.assign(index.source as object, { name: 'n'.repeat(20_000) }));
   expect((await readSession(bytes)).source.name).toBe('n'.repeat(200));
@@ -173,7 +178,7 @@ describe('a file is refused that', () => {
     ['has a coordinate too far', () => withView({ crosshair: [0, 0, 1e308] }), 'view.crosshair[2] is not a number'],
     ['has a point of two numbers', () => withView({ crosshair: [0, 0] }), 'view.crosshair'],
     ['has an unknown option', () => withView({ options: { ...OPTIONS, slices: 'x' } }), 'view.options.slices is none'],
-    ['lacks an option', () => withView({ options: { surface: true } }), 'view.options.edges is missing'],
+    ['lacks the camera', () => withView({ camera: undefined }), 'view.camera is missing'],
     ['has an infinite parameter', () => withPage({ params: { iso: INFINITY } }), 'page.params'],
     ['has too many attractors', () => withPage({ attractors: Array(20_000).fill(0) }), 'page.attractors is too long'],
     [

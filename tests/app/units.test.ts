@@ -5,10 +5,12 @@ import { quantize } from '../../www/src/engine/quantize';
 import { otsu, quantiles } from '../../www/src/engine/threshold';
 import { lengths } from '../../www/src/kit/format';
 import { History } from '../../www/src/kit/history';
+import { initialOptions } from '../../www/src/kit/view';
 import { toCsv } from '../../www/src/lab/run-table';
 import { UndoStack } from '../../www/src/lab/undo';
 import { EXAMPLES } from '../../www/src/labs/extract/examples';
 import { fromHash, linkOf, toHash } from '../../www/src/labs/extract/link';
+import { EXTRACT_VIEW } from '../../www/src/labs/extract/view';
 import { anatomyOf, type Grid, invert, sliceOrientations, slicePlane, toWorld } from '../../www/src/scene/anatomy';
 import { componentRoots } from '../../www/src/scene/components';
 import { diverging, quantityTitle, robustRange, shadeColors } from '../../www/src/scene/shading';
@@ -201,7 +203,7 @@ describe('a link', () => {
     params: { ...tooth?.params, iso: 700, damping: 0.4, restLength: 'mean' },
     defaults: { damping: 0.4, restLength: 'zero' },
     attractors: [{ point: [1, -2.5, 3] as [number, number, number], strength: 0.1, radius: 8 }],
-    color: 'speed' as const,
+    view: { ...initialOptions(EXTRACT_VIEW), color: 'speed' as const },
   };
 
   test('contains the differences from the example, and is read back unchanged', () => {
@@ -213,7 +215,7 @@ describe('a link', () => {
       edge: 1.5,
       params: { iso: 700, restLength: 'mean' },
       attractors: settings.attractors,
-      color: 'speed',
+      view: { color: 'speed' },
     });
     expect(fromHash(toHash(linked))).toEqual(linked);
   });
@@ -227,7 +229,7 @@ describe('a link', () => {
     const [first] = EXAMPLES;
     if (!first) throw new Error('no example');
     const choice = { kind: 'contour', bubbles: 5, levels: first.levels, edge: first.edge } as const;
-    const plain = { ...settings, example: first, choice, attractors: [], color: 'plain' as const };
+    const plain = { ...settings, example: first, choice, attractors: [], view: initialOptions(EXTRACT_VIEW) };
     expect(toHash(linkOf({ ...plain, params: { ...first.params, damping: 0.4 } }))).toBe('#extract');
   });
 
@@ -237,6 +239,7 @@ describe('a link', () => {
     expect(fromHash('#extract?levels=many&attractor=1,2&p.iso=&start=&v=2')).toEqual({
       params: { iso: '' },
       attractors: [],
+      view: {},
       unread: ['start=', 'levels=many', 'attractor=1,2'],
     });
   });

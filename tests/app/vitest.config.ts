@@ -8,6 +8,10 @@ const ALONE = ['extract', 'frames', 'sculpt', 'worker-package'].map((name) => `$
 
 /** Files of whole figures and lessons, and third-party programs: for `npm run test:all`. */
 const LONG = ['**/*.long.test.ts'];
+/** Files that need no page, but the built package. */
+const UNITS = ['**/*-units.test.ts', '**/units.test.ts'];
+
+const globalSetup = at('setup.ts');
 
 export default defineConfig({
   // As in the app's own build, for tests of its workers' code.
@@ -18,7 +22,6 @@ export default defineConfig({
     ],
   },
   test: {
-    globalSetup: at('setup.ts'),
     dir: at('.'),
     // Pages are rendered in software on two cores: slow machines need time, and nothing waits for a fixed duration.
     testTimeout: 300_000,
@@ -26,18 +29,25 @@ export default defineConfig({
     expect: { poll: { timeout: 120_000 } },
     tags: [{ name: 'long', description: 'Too long for every change: for `npm run test:all`.' }],
     projects: [
+      {
+        extends: true,
+        test: { name: 'units', include: UNITS, maxWorkers: 2, sequence: { groupOrder: 0 } },
+      },
       // Two files at a time: a page that waits for its worker, or for a test, leaves a core free.
       {
         extends: true,
-        test: { name: 'together', exclude: [...ALONE, ...LONG], maxWorkers: 2, sequence: { groupOrder: 0 } },
+        test: {
+          ...{ name: 'together', exclude: [...ALONE, ...LONG, ...UNITS], globalSetup },
+          ...{ maxWorkers: 2, sequence: { groupOrder: 0 } },
+        },
       },
       {
         extends: true,
-        test: { name: 'alone', include: ALONE, fileParallelism: false, sequence: { groupOrder: 1 } },
+        test: { name: 'alone', include: ALONE, globalSetup, fileParallelism: false, sequence: { groupOrder: 1 } },
       },
       {
         extends: true,
-        test: { name: 'long', include: LONG, maxWorkers: 2, sequence: { groupOrder: 2 } },
+        test: { name: 'long', include: LONG, globalSetup, maxWorkers: 2, sequence: { groupOrder: 2 } },
       },
     ],
   },

@@ -94,17 +94,17 @@ export class Labs {
   #follow(event?: HashChangeEvent): void {
     const kind = LABS.find(({ id }) => id === labOf(location.hash));
     if (kind ? kind === this.#kind : this.#kind) return;
-    if (!event?.oldURL || !this.#lab) return void this.#open(kind ?? LABS[0]);
+    if (!event?.oldURL || !this.#lab) return void this.#open(kind ?? labCalled(undefined));
     if (this.#lab.isPlain && !this.#next) {
       void this.#keeping.leave();
-      return void this.#open(kind ?? LABS[0]);
+      return void this.#open(kind ?? labCalled(undefined));
     }
     event.stopImmediatePropagation();
     // The address is that of the open lab as long as it is.
     history.replaceState(null, '', event.oldURL);
     this.#leave(() => {
       history.replaceState(null, '', event.newURL);
-      void this.#open(kind ?? LABS[0]);
+      void this.#open(kind ?? labCalled(undefined));
     });
   }
 

@@ -53,10 +53,10 @@ export const sender =
 
 /**
  * Loads the engine at once, while the page still loads, and serves the page's requests with `handlers`; a failure to
- * load is reported when the page asks for the parameters of `method` (`hello`). Messages without reply go to `onMessage`.
+ * load is reported when the page asks for the parameters of `method` (`hello`), of which there are none without a method. Messages without reply go to `onMessage`.
  */
 export function serve<Message extends { kind: string }>(
-  method: Parameters<typeof paramSpecs>[0],
+  method: Parameters<typeof paramSpecs>[0] | undefined,
   handlers: object,
   onMessage?: (message: Message) => void,
 ): void {
@@ -64,7 +64,7 @@ export function serve<Message extends { kind: string }>(
   starting.catch(() => undefined);
   const hello = async () => {
     await starting;
-    return { version: version(), specs: paramSpecs(method) };
+    return { version: version(), specs: method ? paramSpecs(method) : [] };
   };
   self.onmessage = ({ data }: MessageEvent<Message | { id: number; kind: string; body: unknown }>) => {
     if ('id' in data) void reply({ ...handlers, hello }, data);

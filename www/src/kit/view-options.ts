@@ -1,121 +1,92 @@
-import type { VertexQuantity } from '../engine/protocol';
 import { text } from '../texts';
 import { h } from './dom';
-import { type Choice, type FormControl, placed, selectFrom } from './field';
+import { type FormControl, placed, selectFrom } from './field';
+import { initialOptions, type OptionsOf, type ViewDeclaration, type ViewOption } from './view';
 
-/**
- * Placement of the slices in the 3D view: on the walls behind the surface, at their positions in the volume, or hidden.
- */
-export type SlicePlacement = 'walls' | 'in place' | 'hidden';
-
-/** Colouring of the Extract lab's surface: plain, by connected component, or by a quantity at the vertices. */
-export type ColorMode = 'plain' | 'component' | VertexQuantity;
-
-export interface ViewOptions {
-  surface: boolean;
-  edges: boolean;
-  color: ColorMode;
-  slices: SlicePlacement;
-}
-
-export const PLACEMENTS: Choice<SlicePlacement>[] = [
-  { value: 'walls', label: text('controls.placementWalls') },
-  { value: 'in place', label: text('controls.placementInPlace') },
-  { value: 'hidden', label: text('controls.placementHidden') },
-];
-
-export const COLOR_MODES: Choice<ColorMode>[] = [
-  { value: 'plain', label: text('controls.colorPlain') },
-  { value: 'component', label: text('controls.colorComponent') },
-  { value: 'speed', label: text('controls.colorSpeed') },
-  { value: 'mean curvature', label: text('controls.colorMeanCurvature') },
-  { value: 'gaussian curvature', label: text('controls.colorGaussianCurvature') },
-];
-
-/** An option of a view: a switch, with `choices` a selection list, or with `step` a number from 0 to 1. */
-export interface ViewOption<Options> {
-  name: keyof Options & string;
-  label: string;
-  choices?: readonly Choice[];
-  step?: number;
-}
-
-/** Controls over a 3D view for its options, one for each entry of a list. */
-export class OptionControls<Options extends object> {
+/** Controls over a 3D view for its options: a switch, a selection list or a slider each. */
+export class OptionControls<Declared extends ViewDeclaration> {
   readonly element: HTMLElement;
-  readonly #list: readonly ViewOption<Options>[];
-  readonly #controls = new Map<keyof Options, FormControl>();
-  readonly #initial: Options;
-  readonly #value: Options;
-  readonly #onChange: (options: Options) => void;
+  readonly #declared: Declared;
+  readonly #controls = new Map<keyof Declared, FormControl>();
+  readonly #value: OptionsOf<Declared>;
+  readonly #onChange: (options: OptionsOf<Declared>) => void;
 
-  constructor(list: readonly ViewOption<Options>[], initial: Options, onChange: (options: Options) => void) {
-    this.#list = list;
-    this.#initial = initial;
-    this.#value = { ...initial };
+  constructor(declared: Declared, onChange: (options: OptionsOf<Declared>) => void) {
+    this.#declared = declared;
+    this.#value = initialOptions(declared);
     this.#onChange = onChange;
     const attributes = { class: 'view-options', role: 'group', 'aria-label': text('controls.viewOptions') };
-    this.element = h('div', attributes, ...list.map((option) => this.#build(option)));
+    const controls = Object.entries(declared).map(([name, option]) => this.#build(name, option));
+    this.element = h('div', attributes, ...controls);
     this.#show();
   }
 
-  get value(): Options {
+  get value(): OptionsOf<Declared> {
     return this.#value;
   }
 
   /** Changes options and reports all of them to the lab; an unknown value is replaced by the initial one. */
-  set(changed: Partial<Options>): void {
+  set(changed: Partial<OptionsOf<Declared>>): void {
     Object.assign(this.#value, changed);
-    for (const option of this.#list)
-      if (!isPossible(option, this.#value[option.name])) this.#value[option.name] = this.#initial[option.name];
+    const initial = initialOptions(this.#declared);
+    for (const name of Object.keys(this.#declared) as (keyof Declared & string)[]) {
+      const option = this.#declared[name];
+      if (option && !isPossible(option, this.#value[name])) this.#value[name] = initial[name];
+    }
     this.#show();
     this.#onChange({ ...this.#value });
   }
 
   /** Places an element before the control of an option. */
-  place(element: HTMLElement, before: keyof Options): void {
+  place(element: HTMLElement, before: keyof Declared): void {
     this.#controls.get(before)?.parentElement?.before(element);
   }
 
   /** Hides the control of an option, or shows it. */
-  hide(name: keyof Options, isHidden: boolean): void {
+  hide(name: keyof Declared, isHidden: boolean): void {
     const element = this.#controls.get(name)?.parentElement;
     if (element) element.hidden = isHidden;
   }
 
   /** Hides an entry of an option's selection list, or shows it. */
-  hideEntry(name: keyof Options, value: string, isHidden: boolean): void {
+  hideEntry(name: keyof Declared, value: string, isHidden: boolean): void {
     const entry = this.#entry(name, value);
     if (entry) entry.hidden = isHidden;
   }
 
   /** Disables an entry of an option's selection list, or enables it. */
-  disableEntry(name: keyof Options, value: string, isDisabled: boolean): void {
+  disableEntry(name: keyof Declared, value: string, isDisabled: boolean): void {
     const entry = this.#entry(name, value);
     if (entry) entry.disabled = isDisabled;
   }
 
-  #entry(name: keyof Options, value: string): HTMLOptionElement | null | undefined {
+  #entry(name: keyof Declared, value: string): HTMLOptionElement | null | undefined {
     return this.#controls.get(name)?.querySelector<HTMLOptionElement>(`[value="${value}"]`);
   }
 
-  #build({ name, label, choices, step }: ViewOption<Options>): HTMLElement {
-    const range = { type: 'range', min: 0, max: 1, step };
-    const control = choices ? selectFrom(choices) : h('input', step ? range : { type: 'checkbox' });
+  #build(name: string, option: ViewOption): HTMLElement {
+    const control = controlOf(option);
     control.dataset.view = name;
     this.#controls.set(name, control);
-    control.addEventListener(step ? 'input' : 'change', () => this.set({ [name]: read(control) } as Partial<Options>));
-    if (!choices && !step) return h('label', {}, control, label);
-    return placed(label, control);
+    const change = () => this.set({ [name]: read(control) } as Partial<OptionsOf<Declared>>);
+    control.addEventListener('step' in option ? 'input' : 'change', change);
+    const label = text(option.label);
+    return control.type === 'checkbox' ? h('label', {}, control, label) : placed(label, control);
   }
 
   #show(): void {
     for (const [name, control] of this.#controls) {
-      const value = this.#value[name];
+      const value: unknown = this.#value[name];
       if (typeof value === 'boolean') (control as HTMLInputElement).checked = value;
       else control.value = String(value);
     }
   }
+}
+
+function controlOf(option: ViewOption): FormControl {
+  if ('entries' in option)
+    return selectFrom(Object.entries(option.entries).map(([value, label]) => ({ value, label: text(label) })));
+  return h('input', 'step' in option ? { type: 'range', min: 0, max: 1, step: option.step } : { type: 'checkbox' });
 }
 
 function read(control: FormControl): unknown {
@@ -123,15 +94,8 @@ function read(control: FormControl): unknown {
   return control.type === 'range' ? Number(control.value) : control.value;
 }
 
-function isPossible<Options>({ choices, step }: ViewOption<Options>, value: unknown): boolean {
-  if (choices) return choices.some((choice) => choice.value === value);
-  return step === undefined || (typeof value === 'number' && value >= 0 && value <= 1);
+function isPossible(option: ViewOption, value: unknown): boolean {
+  if ('entries' in option) return typeof value === 'string' && Object.hasOwn(option.entries, value);
+  if ('step' in option) return typeof value === 'number' && value >= 0 && value <= 1;
+  return typeof value === 'boolean';
 }
-
-/** Options of the Extract lab's view: what is shown, and the surface's colouring. */
-export const EXTRACT_OPTIONS: ViewOption<ViewOptions>[] = [
-  { name: 'surface', label: text('controls.viewSurface') },
-  { name: 'edges', label: text('controls.viewWireframe') },
-  { name: 'color', label: text('controls.color'), choices: COLOR_MODES },
-  { name: 'slices', label: text('controls.slices'), choices: PLACEMENTS },
-];

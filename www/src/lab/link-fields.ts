@@ -4,6 +4,7 @@
  */
 import type { ParamValues, Vec3 } from '../engine/protocol';
 import type { Choice } from '../kit/field';
+import type { OptionsOf, ViewDeclaration, ViewOption } from '../kit/view';
 import { allIn, listOf, MOST_NAME, paramsIn, queryOf, readValue } from './link-query';
 
 /** A setting in links. */
@@ -28,9 +29,10 @@ type Values<Fields> = {
       : never;
 };
 
-/** Settings in a link: those of the fields, and the parameters of the method. */
-export type Linked<Fields> = Values<Fields> & {
+/** Settings in a link: those of the fields, the parameters of the method, and the options of the view. */
+export type Linked<Fields, View extends ViewDeclaration> = Values<Fields> & {
   params: ParamValues;
+  view: Partial<OptionsOf<View>>;
   /** Unknown settings, and those with an invalid value, as `name=text`. */
   unread?: string[];
 };
@@ -94,27 +96,36 @@ export const many = <T>(field: Field<T>, most: number): Repeated<T> => ({ ...fie
 const VERSION = 'v';
 
 /** How a lab's settings are written in links, and read from them. */
-export interface LinkFormat<Fields> {
+export interface LinkFormat<Fields, View extends ViewDeclaration> {
   /** Converts settings to the hash of an address. */
-  toHash(settings: Linked<Fields>): string;
+  toHash(settings: Linked<Fields, View>): string;
   /** Parses the hash of an address; undefined if it is for another lab or contains no settings. */
-  fromHash(hash: string): Linked<Fields> | undefined;
+  fromHash(hash: string): Linked<Fields, View> | undefined;
+}
+
+/** Returns the field of an option of the view. */
+function optionField(option: ViewOption): Field<unknown> {
+  if ('entries' in option) return oneOf(Object.keys(option.entries));
+  return 'step' in option ? real((value) => value >= 0 && value <= 1) : flag;
 }
 
 /**
- * Declares the settings in links to a lab. Whether their values suit its data, and whether parameters are known, is not
- * checked here.
+ * Declares the settings in links to a lab: its own, and the options of its view. Whether their values suit its data, and
+ * whether parameters are known, is not checked here.
  */
-export function linkFormat<Fields extends Record<string, Field<unknown>>>(
+export function linkFormat<Fields extends Record<string, Field<unknown>>, View extends ViewDeclaration>(
   address: string,
   fields: Fields,
+  options: View,
   readParam: (text: string) => unknown = readValue,
-): LinkFormat<Fields> {
-  const all = Object.entries<Field<unknown> | Repeated<unknown>>(fields);
+): LinkFormat<Fields, View> {
+  const views = Object.entries(options).map(([name, option]) => [name, optionField(option)] as const);
+  const all: (readonly [string, Field<unknown> | Repeated<unknown>])[] = [...Object.entries(fields), ...views];
+  const known = new Set(all.map(([name]) => name));
   return {
-    toHash({ params, unread: _, ...values }) {
+    toHash({ params, view, unread: _, ...values }) {
       const query = new URLSearchParams();
-      const given = values as Record<string, unknown>;
+      const given: Record<string, unknown> = { ...values, ...view };
       for (const [key, field] of all)
         if (given[key] !== undefined && !('most' in field)) query.set(key, field.write(given[key]));
       for (const [key, value] of Object.entries(params)) query.set(`p.${key}`, String(value));
@@ -144,10 +155,12 @@ export function linkFormat<Fields extends Record<string, Field<unknown>>>(
         }
       }
       for (const [key, text] of query)
-        if (!Object.hasOwn(fields, key) && key !== VERSION && !key.startsWith('p.'))
+        if (!known.has(key) && key !== VERSION && !key.startsWith('p.'))
           unread.push(`${key}=${text}`.slice(0, MOST_NAME));
-      const settings = { ...values, params: paramsIn(query, readParam), ...(unread.length > 0 && { unread }) };
-      return settings as Linked<Fields>;
+      const view = among(values, Object.keys(options));
+      for (const name of Object.keys(options)) delete values[name];
+      const params = paramsIn(query, readParam);
+      return { ...values, params, view, ...(unread.length > 0 && { unread }) } as Linked<Fields, View>;
     },
   };
 }

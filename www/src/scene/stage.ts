@@ -10,7 +10,7 @@ import type {
   VolumeView,
 } from '../engine/protocol';
 import { onSchemeChange, token } from '../kit/dom';
-import type { ViewOptions } from '../kit/view-options';
+import type { ColorMode, SlicePlacement } from '../kit/view';
 import { nearestVoxel, slicePlane, toWorld } from './anatomy';
 import { crossSection } from './cross-section';
 import { EditedView } from './edited-view';
@@ -24,11 +24,19 @@ import { SurfaceObject } from './surface';
 import { type CameraPose, Viewport } from './viewport';
 import { VolumeScene } from './volume-scene';
 
-/** Camera, crosshair and options of a {@link Stage}. */
+/** Camera and crosshair of a {@link Stage}. */
 export interface StageView {
   camera: CameraPose;
   /** World position of the crosshair. */
   crosshair: Vec3;
+}
+
+/** Options of a {@link Stage}. */
+export interface StageOptions {
+  surface: boolean;
+  edges: boolean;
+  color: ColorMode;
+  slices: SlicePlacement;
 }
 
 /** The 3D view and the three slices of a volume in the Extract lab, synchronised by a common crosshair. */
@@ -49,7 +57,7 @@ export class Stage {
   /** Called whenever the crosshair, and with it the slices, may have moved. */
   onMoved: () => void = () => undefined;
   readonly #onPlanes: (planes: Plane[]) => void;
-  #options: ViewOptions;
+  #options: StageOptions;
   #scene: VolumeScene | undefined;
   #attractors: Attractor[] = [];
   /** Index of the voxel in which the three slices intersect. */
@@ -62,7 +70,7 @@ export class Stage {
   constructor(
     canvas: HTMLCanvasElement,
     slices: HTMLElement,
-    options: ViewOptions,
+    options: StageOptions,
     onPlanes: (planes: Plane[]) => void,
   ) {
     this.#viewport = new Viewport(canvas);
@@ -134,7 +142,7 @@ export class Stage {
     return { viewport: this.#viewport, legend: this.legend, panels: () => this.#scene?.panels ?? [] };
   }
 
-  setOptions(options: ViewOptions): void {
+  setOptions(options: StageOptions): void {
     this.#options = options;
     this.#surface.edges = options.edges;
     this.#surface.solid = options.surface;

@@ -18,7 +18,7 @@ import {
   Vector3,
 } from 'three';
 import type { Surface } from '../engine/protocol';
-import type { ColorMode } from '../kit/view-options';
+import type { ColorMode } from '../kit/view';
 import { componentColors } from './components';
 import { isQuantity, linearColors, QUANTITIES, robustRange, type ShownQuantity, shadeColors } from './shading';
 import { simplifiedIndices } from './simplify';

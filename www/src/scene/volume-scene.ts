@@ -2,7 +2,7 @@ import { Plane, Vector3 } from 'three';
 import type { LevelView, Vec3, VolumeView } from '../engine/protocol';
 import { token } from '../kit/dom';
 import { count, figure, place } from '../kit/format';
-import type { SlicePlacement } from '../kit/view-options';
+import type { SlicePlacement } from '../kit/view';
 import { text } from '../texts';
 import { type Axis, anatomyOf, invert, type SliceOrientation, sliceOrientations, slicePlane, toWorld } from './anatomy';
 import { AXIS_TOKENS, type SlicePanel } from './panel';

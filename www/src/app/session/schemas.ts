@@ -1,3 +1,4 @@
+import type { LabId } from '../../lab/address';
 import type { SessionSchema } from '../../lab/session/check';
 import * as extract from '../../labs/extract/schema';
 import * as reconstruct from '../../labs/reconstruct/schema';
@@ -7,5 +8,5 @@ import * as track from '../../labs/track/schema';
 
 /** The schemas of sessions, by lab. */
 export const SCHEMAS: ReadonlyMap<unknown, SessionSchema> = new Map<string, SessionSchema>(
-  Object.entries({ extract, reconstruct, sculpt, segment, track }),
+  Object.entries({ extract, reconstruct, sculpt, segment, track } satisfies Record<LabId, SessionSchema>),
 );

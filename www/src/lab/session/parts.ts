@@ -15,9 +15,7 @@ import {
   variant,
 } from 'valibot';
 import type { Warning } from '../../engine/warnings';
-import type { SlicePlacement } from '../../kit/view-options';
-import type { SurfaceColor } from '../../scene/surface';
-import { anyNumber, between, bytes, count, flag, list, name, named, oneOf, real, text, vec3 } from './values';
+import { anyNumber, between, bytes, count, flag, list, name, named, real, text, vec3 } from './values';
 
 const warning = object({
   // Later versions may have other kinds.
@@ -104,12 +102,6 @@ export const states = <const Entries extends ObjectEntries>(moment: Entries) => 
 export const history = object({ list: count, iteration: count });
 
 export const camera = object({ position: vec3, target: vec3 });
-export const placement = oneOf<SlicePlacement>({ walls: true, 'in place': true, hidden: true });
-/** Colourings that surfaces may have. */
-export const color = oneOf<SurfaceColor>({
-  ...{ plain: true, component: true, own: true, texture: true, speed: true, distance: true, deviation: true },
-  ...{ 'mean curvature': true, 'gaussian curvature': true, 'area distortion': true, 'angle distortion': true },
-});
 
 interface Page {
   history: { list: number };

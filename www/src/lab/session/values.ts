@@ -10,6 +10,9 @@ import {
   maxValue,
   minValue,
   number,
+  type ObjectSchema,
+  type OptionalSchema,
+  object,
   optional,
   picklist,
   pipe,
@@ -22,6 +25,7 @@ import {
   unknown,
 } from 'valibot';
 import { shortName } from '../../engine/labels';
+import type { OptionsOf, ViewDeclaration, ViewOption } from '../../kit/view';
 
 /** Most characters of a text that is shown as it is. */
 const MOST_TEXT = 10_000;
@@ -65,3 +69,20 @@ export const oneOf = <Name extends string>(names: Record<Name, true>) => picklis
 
 /** Values of a method's parameters. The worker tests names and values against the specification of the method. */
 export const params = named(union([real, flag, text(200)]), 200);
+
+type ValuesOf<Declared extends ViewDeclaration> = {
+  [Name in keyof Declared]: OptionalSchema<GenericSchema<OptionsOf<Declared>[Name]>, OptionsOf<Declared>[Name]>;
+};
+
+/** The options of a lab's view; those that a session lacks, which were declared after it, have their initial values. */
+export function viewOptions<Declared extends ViewDeclaration>(
+  declared: Declared,
+): ObjectSchema<ValuesOf<Declared>, undefined> {
+  const entries = Object.entries(declared).map(([name, option]) => [name, optional(optionOf(option), option.initial)]);
+  return object(Object.fromEntries(entries)) as ObjectSchema<ValuesOf<Declared>, undefined>;
+}
+
+function optionOf(option: ViewOption): GenericSchema<unknown> {
+  if ('entries' in option) return picklist(Object.keys(option.entries));
+  return 'step' in option ? pipe(number(), minValue(0), maxValue(1)) : flag;
+}

@@ -3,6 +3,7 @@ import { isOfSmall } from '../../engine/small-files';
 import { nameOf, reading } from '../../importers/files';
 
 import { count } from '../../kit/format';
+import { initialOptions } from '../../kit/view';
 import { dataUrl, fetchBytes, preload } from '../../lab/downloads';
 import type { Handoff } from '../../lab/lab';
 import { LinkError, readLink } from '../../lab/link-query';
@@ -21,6 +22,7 @@ import type { ImageSource, Loaded, Setup } from './protocol';
 import type { ExtractResults } from './results';
 import type { ExtractContent } from './schema';
 import type { ExtractMoments, ExtractSettings } from './settings';
+import { EXTRACT_VIEW } from './view';
 
 export type ExtractSource = Source<Example, Linked, ImageSource>;
 export type ExtractOpening = Opening<Example, Linked, ImageSource, OpenedVolume>;
@@ -68,7 +70,7 @@ export class ExtractData implements LabData<Example, Linked, ImageSource, Opened
   /** Returns a volume passed on by another lab, with the parameters passed on with it. */
   fromHandoff({ name, bytes, params, warnings = [] }: Handoff): ExtractSource {
     const load = async () => ({ files: [{ name, bytes: bytes.slice() }] });
-    return { name, load, linked: { params, attractors: [] }, unit: '', isMade: true, warnings };
+    return { name, load, linked: { params, attractors: [], view: {} }, unit: '', isMade: true, warnings };
   }
 
   find(id: string): Example | undefined {
@@ -91,7 +93,7 @@ export class ExtractData implements LabData<Example, Linked, ImageSource, Opened
   atFrame({ session: _, ...present }: ExtractSource, frame: number): ExtractSource {
     const { params, attractors, sphere } = this.#settings;
     const { kind: start, edge = 0, ...choice } = this.#ui.start.inForce;
-    const linked = { ...choice, frame, start, edge, sphere, params, attractors };
+    const linked = { ...choice, view: {}, frame, start, edge, sphere, params, attractors };
     return { ...present, linked, isChange: true };
   }
 
@@ -130,7 +132,8 @@ export class ExtractData implements LabData<Example, Linked, ImageSource, Opened
     const { volume, choice, params, setup, moments, labels = 0 } = opened;
     this.#states.ready = true;
     this.#ui.adopt(volume, source, labels);
-    if (source.linked?.color) this.#ui.options.set({ color: source.linked.color });
+    if (source.linked && !source.isChange)
+      this.#ui.options.set({ ...initialOptions(EXTRACT_VIEW), ...source.linked.view });
     this.#settings.adopt(volume, choice, params, setup);
     if (moments)
       return this.#resume(moments, source.session && contentOf<ExtractContent>(source.session, 'extract').view);

@@ -1,7 +1,6 @@
 import type { VertexQuantity } from '../../engine/protocol';
 import { History } from '../../kit/history';
 import type { LabState } from '../../kit/state';
-import type { ViewOptions } from '../../kit/view-options';
 import type { Lab, LabPlace } from '../../lab/lab';
 import { Opening } from '../../lab/opening';
 import { type RunningLab, Runs } from '../../lab/runs';
@@ -16,6 +15,7 @@ import { ExtractParts, type PartEvents } from './parts';
 import type { WorkerEvent } from './protocol';
 import { ExtractResults } from './results';
 import { ExtractSettings } from './settings';
+import type { ExtractViewOptions } from './view';
 
 /** The Extract lab: a deformable surface is fitted to a volume. Data, settings and results are in files of their own. */
 class ExtractLab implements RunningLab<Example> {
@@ -118,7 +118,7 @@ class ExtractLab implements RunningLab<Example> {
     this.shell.updateAddress();
   }
 
-  #setOptions({ color }: ViewOptions): void {
+  #setOptions({ color }: ExtractViewOptions): void {
     const quantity = color === 'plain' || color === 'component' ? undefined : color;
     if (quantity !== this.#quantity) this.shell.ask(this.client.request('quantity', quantity));
     this.#quantity = quantity;
@@ -140,7 +140,7 @@ class ExtractLab implements RunningLab<Example> {
         params,
         defaults,
         attractors,
-        color: this.ui.options.value.color,
+        view: this.ui.options.value,
       }),
     );
   }

@@ -1,12 +1,13 @@
 /** Converts the Extract lab's settings to the hash of an address, `#extract?…`, and back. */
 
 import type { Attractor, ParamValues, Vec3 } from '../../engine/protocol';
-import { COLOR_MODES, type ColorMode } from '../../kit/view-options';
+import { initialOptions } from '../../kit/view';
 import { as, integer, linkFormat, many, name, numbers, oneOfChoices, real } from '../../lab/link-fields';
 import { differing } from '../../lab/link-query';
 import { EXAMPLES, type Example } from './examples';
 import { SHAPES, type StartChoice } from './panels/start';
 import { defaultStart, exampleById, isPreset, PAPER } from './presets';
+import { EXTRACT_VIEW, type ExtractViewOptions } from './view';
 
 export const ADDRESS = '#extract';
 /** Most attractors that a link includes: some programs truncate long addresses. */
@@ -37,7 +38,7 @@ export interface Linked {
   edge?: number;
   params: ParamValues;
   attractors: Attractor[];
-  color?: ColorMode;
+  view: Partial<ExtractViewOptions>;
   unread?: string[];
 }
 
@@ -52,11 +53,14 @@ const attractor = as(
   ({ point, strength, radius }) => [...point, strength, radius],
 );
 
-const FORMAT = linkFormat(ADDRESS, {
-  ...{ example: name, file: name, frame: integer(0), start: oneOfChoices(SHAPES), bubbles: real(), sphere },
-  ...{ levels: integer(0), edge: real(), color: oneOfChoices(COLOR_MODES) },
-  ...{ attractor: many(attractor, MOST_ATTRACTORS), v: name },
-});
+const FORMAT = linkFormat(
+  ADDRESS,
+  {
+    ...{ example: name, file: name, frame: integer(0), start: oneOfChoices(SHAPES), bubbles: real(), sphere },
+    ...{ levels: integer(0), edge: real(), attractor: many(attractor, MOST_ATTRACTORS), v: name },
+  },
+  EXTRACT_VIEW,
+);
 
 /** Present settings of the Extract lab, from which a link is made. */
 export interface LabSettings {
@@ -72,7 +76,7 @@ export interface LabSettings {
   /** Default parameters of the method; the link contains only parameters that differ. */
   defaults: ParamValues;
   attractors: Attractor[];
-  color: ColorMode;
+  view: ExtractViewOptions;
 }
 
 /**
@@ -80,7 +84,7 @@ export interface LabSettings {
  * from the method's defaults, and all attractors unless they are too many.
  */
 export function linkOf(settings: LabSettings): Linked {
-  const { example, file, frame, choice, sphere, params, defaults, attractors, color } = settings;
+  const { example, file, frame, choice, sphere, params, defaults, attractors, view } = settings;
   const usual = { levels: 1, edge: undefined, ...example };
   const start = defaultStart(example);
   const bubbles = 'bubbles' in start ? start.bubbles : undefined;
@@ -95,7 +99,7 @@ export function linkOf(settings: LabSettings): Linked {
     ...(choice.edge !== usual.edge && { edge: choice.edge ?? 0 }),
     params: differing(params, { ...defaults, ...example?.params }),
     attractors: attractors.length <= MOST_ATTRACTORS ? attractors : [],
-    ...(color !== 'plain' && { color }),
+    view: differing({ ...view }, { ...initialOptions(EXTRACT_VIEW) }),
   };
 }
 

@@ -7,7 +7,8 @@ import type { History } from '../../kit/history';
 import { MeasurePanel } from '../../kit/measures';
 import { ENERGY_PLOTS, Plots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
-import { EXTRACT_OPTIONS, OptionControls, type ViewOptions } from '../../kit/view-options';
+import { initialOptions } from '../../kit/view';
+import { OptionControls } from '../../kit/view-options';
 import { LabPage } from '../../lab/page';
 import { RunControls, type RunEvents } from '../../lab/run-controls';
 import { spaceOf, unitOf } from '../../lab/surface-space';
@@ -30,8 +31,7 @@ import { StartControls } from './panels/start';
 import { TimeTable } from './panels/times';
 import { isPreset, type Preset, type Variant, variantInForce } from './presets';
 import type { LargeSource } from './protocol';
-
-const INITIAL_VIEW: ViewOptions = { surface: true, edges: false, color: 'plain', slices: 'walls' };
+import { EXTRACT_VIEW, type ExtractViewOptions } from './view';
 
 export interface PartEvents extends RunEvents<Example> {
   onLarge: (name: string, source: LargeSource) => void;
@@ -39,7 +39,7 @@ export interface PartEvents extends RunEvents<Example> {
   onVariant: (preset: Preset, variant: Variant) => void;
   onStart: () => void;
   onAttractors: (attractors: Attractor[], what: string, tuning: boolean) => void;
-  onOptions: (options: ViewOptions) => void;
+  onOptions: (options: ExtractViewOptions) => void;
   onPlanes: (planes: Plane[]) => void;
   onCompare: () => void;
   onCancelCompare: () => void;
@@ -67,7 +67,7 @@ export class ExtractParts {
   readonly start: StartControls;
   readonly pyramid: PyramidPanel;
   readonly attractors: AttractorControls;
-  readonly options: OptionControls<ViewOptions>;
+  readonly options: OptionControls<typeof EXTRACT_VIEW>;
   readonly compare: ComparePanel;
   readonly coverage: CoveragePanel;
   readonly #figure: FigurePanel<Variant, Preset>;
@@ -96,7 +96,7 @@ export class ExtractParts {
     this.large = large;
     this.#frames = frames;
     this.#labels = new LabelsOffer(events.onSegment);
-    this.stage = new Stage(this.page.canvas, this.#slices, INITIAL_VIEW, events.onPlanes);
+    this.stage = new Stage(this.page.canvas, this.#slices, initialOptions(EXTRACT_VIEW), events.onPlanes);
     this.#figure = new FigurePanel<Variant, Preset>(events.onVariant);
     this.histogram = new Histogram((iso) => events.onParam('iso', iso));
     this.start = new StartControls(events.onStart);
@@ -111,7 +111,7 @@ export class ExtractParts {
       onGoTo: (point) => this.stage.goTo(point),
       crosshair: () => this.stage.crosshair,
     });
-    this.options = new OptionControls(EXTRACT_OPTIONS, INITIAL_VIEW, (options) => {
+    this.options = new OptionControls(EXTRACT_VIEW, (options) => {
       this.stage.setOptions(options);
       events.onOptions(options);
     });

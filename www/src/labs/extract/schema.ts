@@ -1,11 +1,11 @@
 /** The schema of sessions of the Extract lab. */
 
 import { type InferOutput, literal, object, optional, picklist, undefined_, variant } from 'valibot';
-import type { ColorMode } from '../../kit/view-options';
 import { MOST_ATTRACTORS } from '../../lab/attractors';
 import type { ContentOf } from '../../lab/session/check';
-import { call, camera, history, log, markMismatch, placement, session, states, steps } from '../../lab/session/parts';
-import { bytes, count, flag, list, maybe, oneOf, params, real, vec3 } from '../../lab/session/values';
+import { call, camera, history, log, markMismatch, session, states, steps } from '../../lab/session/parts';
+import { bytes, count, flag, list, maybe, oneOf, params, real, vec3, viewOptions } from '../../lab/session/values';
+import { EXTRACT_VIEW } from './view';
 
 const start = variant('kind', [
   object({ kind: picklist(['contour', 'enclosing', 'isosurface']) }),
@@ -38,13 +38,7 @@ const moment = {
     ...{ params, attractors, history },
   }),
 };
-const color = oneOf<ColorMode>({
-  ...{ plain: true, component: true, speed: true, 'mean curvature': true, 'gaussian curvature': true },
-});
-const view = object({
-  ...{ camera, crosshair: vec3 },
-  options: object({ surface: flag, edges: flag, color, slices: placement }),
-});
+const view = object({ camera, crosshair: vec3, options: viewOptions(EXTRACT_VIEW) });
 
 /** The lab's own part of a session: its model, history, undo and view. */
 export type ExtractContent = ContentOf<typeof schema>;

@@ -1,7 +1,8 @@
-import type { SurfaceColor } from '../../scene/surface';
+import { initialOptions } from '../../kit/view';
 import { text } from '../../texts';
 import type { PointShape } from './clouds';
 import type { ParamValues } from './protocol';
+import { CLOUD_VIEW, type CloudViewOptions } from './view';
 
 /** An example of the Reconstruct lab: points, suitable settings and credits. */
 export interface CloudExample {
@@ -20,7 +21,8 @@ export interface CloudExample {
   maxPoints?: number;
   keepComponents?: number;
   params: ParamValues;
-  color: SurfaceColor;
+  /** Options of the view with which the example opens, where they differ from the lab's. */
+  view?: Partial<CloudViewOptions>;
   credit: string;
 }
 
@@ -43,7 +45,7 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
     front: -1,
     keepComponents: 1,
     params: PAPER,
-    color: 'own',
+    view: { color: 'own' },
     credit: `${SPOT} ${text('reconstructPresets.spotStereoCredit')}`,
   },
   {
@@ -54,7 +56,7 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
     up: 'y',
     front: -1,
     params: PAPER,
-    color: 'own',
+    view: { color: 'own' },
     credit: `${SPOT} ${text('reconstructPresets.spotCarvedCredit')}`,
   },
   {
@@ -63,7 +65,6 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
     source: { file: 'angel.ply' },
     up: 'z',
     params: PAPER,
-    color: 'plain',
     credit: text('reconstructPresets.angelCredit'),
   },
   {
@@ -72,7 +73,6 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
     source: { shape: 'torus' },
     up: 'z',
     params: PAPER,
-    color: 'plain',
     credit: text('reconstructPresets.torusCredit'),
   },
   {
@@ -81,7 +81,12 @@ export const CLOUDS: [CloudExample, ...CloudExample[]] = [
     source: { shape: 'two balls' },
     up: 'z',
     params: PAPER,
-    color: 'plain',
     credit: text('reconstructPresets.twoBallsCredit'),
   },
 ];
+
+/** Returns the options of the view with which an example, or else the user's own points without colours, opens. */
+export const viewOf = (example: CloudExample | undefined): CloudViewOptions => ({
+  ...initialOptions(CLOUD_VIEW),
+  ...example?.view,
+});

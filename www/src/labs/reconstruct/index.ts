@@ -10,15 +10,15 @@ import { text } from '../../texts';
 import { completed } from './before';
 import { connectReconstruct } from './client';
 import { type CloudOrigin, type OpenedCloud, ReconstructData, type ReconstructOpening } from './data';
-import type { CloudExample } from './examples';
+import { type CloudExample, viewOf } from './examples';
 import { fits, linkOf, photoFor, toHash } from './link';
 import { type PartEvents, ReconstructParts } from './parts';
 import { type CloudPreset, type CloudVariant, isCloudPreset, variantInForce } from './presets';
 import type { ParamValues, PointQuantity, WorkerEvent } from './protocol';
 import { ReconstructResults } from './results';
-import type { CloudViewOptions } from './scene';
 import type { ReconstructContent } from './schema';
 import { ReconstructSettings } from './settings';
+import type { CloudViewOptions } from './view';
 
 /**
  * Number of voxels along the longest side of the volume in which the implicit function f is saved, or passed on to the
@@ -100,10 +100,8 @@ class ReconstructLab implements RunningLab<CloudExample> {
     this.#results.clear();
     this.ui.adopt(cloud, photographs, example, name);
     this.#settings.adopt(cloud, setup);
-    const color = (linked?.color ??
-      example?.color ??
-      (pictured || cloud.colors ? 'own' : 'plain')) as CloudViewOptions['color'];
-    this.ui.options.set({ color, points: true, constraints: false, ...(isCloudPreset(example) && example.view) });
+    const colored = !example && (pictured || cloud.colors) ? ({ color: 'own' } as const) : {};
+    this.ui.options.set({ ...viewOf(example), ...colored, ...linked?.view });
     this.ui.photos.choose(photoFor(example, linked?.photo));
     this.#settings.showParams(params);
     if (session) return this.#resume(completed(contentOf<ReconstructContent>(session, 'reconstruct')));
@@ -157,10 +155,10 @@ class ReconstructLab implements RunningLab<CloudExample> {
   address({ example, name: file }: CloudOrigin): string {
     const { choice, params, edits } = this.#settings;
     const { defaults } = this.#data;
-    const { color } = this.ui.options.value;
+    const { value: view } = this.ui.options;
     const photo = this.ui.photos.chosen;
     const { size } = this.ui.view;
-    return toHash(linkOf({ example, file, choice, params, defaults, edits, size, color, photo }));
+    return toHash(linkOf({ example, file, choice, params, defaults, edits, size, view, photo }));
   }
 
   linkLacks(): (string | false)[] {

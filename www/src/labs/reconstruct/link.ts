@@ -1,15 +1,14 @@
 /** Converts the Reconstruct lab's settings to the hash of an address, `#reconstruct?…`, and back. */
 import { shortenedPoint } from '../../engine/placing';
 import type { ParamValues, Vec3 } from '../../engine/protocol';
-import { type Field, integer, linkFormat, many, name, oneOfChoices, point } from '../../lab/link-fields';
+import { type Field, integer, linkFormat, many, name, point } from '../../lab/link-fields';
 import { differing } from '../../lab/link-query';
-import type { SurfaceColor } from '../../scene/surface';
 import { withPaper } from './before';
-import { CLOUDS, type CloudExample } from './examples';
-import { CLOUD_COLORS } from './panels/cloud-options';
+import { CLOUDS, type CloudExample, viewOf } from './examples';
 import type { CloudChoice } from './panels/cloud-setup';
 import { isCloudPreset } from './presets';
 import type { Edits } from './protocol';
+import { CLOUD_VIEW, type CloudViewOptions } from './view';
 
 const ADDRESS = '#reconstruct';
 /** Significant digits of coordinates: finer than any click. */
@@ -33,7 +32,7 @@ export interface LinkedCloud extends Partial<CloudChoice> {
   file?: string;
   params: ParamValues;
   edits: Edits;
-  color?: SurfaceColor;
+  view: Partial<CloudViewOptions>;
   /** Number of the photograph whose camera the view uses, from 1; 0 for none. */
   photo?: number;
   unread?: string[];
@@ -49,11 +48,14 @@ const indices: Field<number[]> = {
   write: (all) => all.join(','),
 };
 
-const FORMAT = linkFormat(ADDRESS, {
-  ...{ example: name, file: name, maxPoints: integer(0), keepComponents: integer(0) },
-  ...{ color: oneOfChoices(CLOUD_COLORS), photo: integer(0) },
-  ...{ add: many(point, MOST_EDITS), outside: many(point, MOST_EDITS), remove: indices, v: name },
-});
+const FORMAT = linkFormat(
+  ADDRESS,
+  {
+    ...{ example: name, file: name, maxPoints: integer(0), keepComponents: integer(0), photo: integer(0) },
+    ...{ add: many(point, MOST_EDITS), outside: many(point, MOST_EDITS), remove: indices, v: name },
+  },
+  CLOUD_VIEW,
+);
 
 /** Present settings of the Reconstruct lab, from which a link is made. */
 export interface CloudSettings {
@@ -65,7 +67,7 @@ export interface CloudSettings {
   edits: Edits;
   /** Size of the points, to which coordinates are rounded. */
   size: number;
-  color: SurfaceColor;
+  view: CloudViewOptions;
   photo: number | undefined;
 }
 
@@ -75,7 +77,7 @@ export interface CloudSettings {
  * number of points, `keepComponents` is 0 for all clusters.
  */
 export function linkOf(settings: CloudSettings): LinkedCloud {
-  const { example, file, choice, params, defaults, edits, size, color, photo } = settings;
+  const { example, file, choice, params, defaults, edits, size, view, photo } = settings;
   const short = (points: Vec3[]) => points.map((point) => shortenedPoint(point, DIGITS, size));
   const { maxPoints, keepComponents } = choice;
   return {
@@ -87,7 +89,7 @@ export function linkOf(settings: CloudSettings): LinkedCloud {
     edits: fits(edits)
       ? { ...edits, added: short(edits.added), outside: short(edits.outside) }
       : { added: [], removed: [], outside: [] },
-    ...(color !== (example?.color ?? 'plain') && { color }),
+    view: differing({ ...view }, { ...viewOf(example) }),
     ...(photo !== photoOf(example) && { photo: photo === undefined ? 0 : photo + 1 }),
   };
 }

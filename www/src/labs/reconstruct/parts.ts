@@ -6,6 +6,7 @@ import type { History } from '../../kit/history';
 import { MeasurePanel } from '../../kit/measures';
 import { Plots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
+import { initialOptions } from '../../kit/view';
 import type { OptionControls } from '../../kit/view-options';
 import { LabPage } from '../../lab/page';
 import { RunControls, type RunEvents } from '../../lab/run-controls';
@@ -25,16 +26,8 @@ import type { Photograph } from './photographs';
 import { ACCEPT } from './point-files';
 import type { CloudPreset, CloudVariant } from './presets';
 import type { Cloud, ParamValues } from './protocol';
-import { type CloudViewOptions, type Hit, ReconstructionView } from './scene';
-
-const INITIAL_VIEW: CloudViewOptions = {
-  surface: true,
-  edges: false,
-  points: true,
-  constraints: false,
-  cameras: false,
-  color: 'own',
-};
+import { type Hit, ReconstructionView } from './scene';
+import { CLOUD_VIEW, type CloudViewOptions } from './view';
 
 export interface PartEvents extends RunEvents<CloudExample> {
   onVariant: (preset: CloudPreset, variant: CloudVariant) => void;
@@ -58,7 +51,7 @@ export class ReconstructParts {
   readonly measures = new MeasurePanel(FIT_ROWS);
   readonly warning = h('p', { class: 'warning', role: 'status', 'data-warning': '' });
   readonly setup: CloudSetup;
-  readonly options: OptionControls<CloudViewOptions>;
+  readonly options: OptionControls<typeof CLOUD_VIEW>;
   readonly photos: PhotoStrip;
   readonly tools: EditTools;
   readonly plots: Plots;
@@ -84,14 +77,14 @@ export class ReconstructParts {
       fetchMesh: (request) => client.request('export', request),
       residual: 'residual',
     });
-    this.view = new ReconstructionView(this.page.canvas, INITIAL_VIEW);
+    this.view = new ReconstructionView(this.page.canvas, initialOptions(CLOUD_VIEW));
     this.#events = events;
     this.setup = new CloudSetup(events.onChoice);
     this.tools = new EditTools((tool) => this.#setTool(tool !== 'none'), events.onTakeBack);
     this.plots = new Plots(history, [RESIDUAL_PLOT], false);
     this.timing = new TimingPanel(client, events.onError);
     this.#figure = new FigurePanel<CloudVariant, CloudPreset>(events.onVariant);
-    this.options = cloudOptions(INITIAL_VIEW, (options) => {
+    this.options = cloudOptions((options) => {
       this.view.setOptions(options);
       events.onOptions(options);
     });

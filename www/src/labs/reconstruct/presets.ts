@@ -5,7 +5,6 @@
 import { text } from '../../texts';
 import { CLOUDS, type CloudExample, PAPER } from './examples';
 import type { ParamValues } from './protocol';
-import type { CloudViewOptions } from './scene';
 
 /**
  * Expected number of components or genus of a surface; a range where rounding errors decide into how many pieces the
@@ -41,8 +40,6 @@ export interface CloudPreset extends CloudExample {
   paperResult: string;
   variants: [CloudVariant, ...CloudVariant[]];
   hint?: string;
-  /** View options with which the preset opens, where they differ from the lab's defaults. */
-  view?: Partial<CloudViewOptions>;
   /** Index, from 0, of the photograph whose camera the preset's view uses; undefined for the usual view. */
   photo?: number;
 }
@@ -59,7 +56,7 @@ const CARVED_COW = {
   up: 'y',
   front: -1,
   maxPoints: 3000,
-  color: 'own',
+  view: { color: 'own' },
   credit: CARVED,
 } as const;
 const STEREO_COW = {
@@ -68,7 +65,7 @@ const STEREO_COW = {
   up: 'y',
   front: -1,
   keepComponents: 1,
-  color: 'own',
+  view: { color: 'own' },
   credit: STEREO,
 } as const;
 
@@ -80,7 +77,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     up: 'z',
     front: -1,
     params: { ...PAPER, kernel: 'thin-plate' },
-    color: 'mean curvature',
+    view: { color: 'mean curvature' },
     credit: text('reconstructPresets.figure2Credit'),
     paperResult: text('reconstructPresets.figure2Paper'),
     variants: [
@@ -159,7 +156,6 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     source: { shape: 'torus' },
     up: 'z',
     params: { ...PAPER, delta: 10, tau: 0.01 },
-    color: 'plain',
     credit: text('reconstructPresets.figure4Credit'),
     paperResult: text('reconstructPresets.figure4Paper'),
     variants: [
@@ -248,7 +244,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     ...STEREO_COW,
     maxPoints: 2168,
     params: { ...PAPER, delta: 10, tau: 0.01, lambdaSurface: 0.002 },
-    view: { constraints: true },
+    view: { color: 'own', constraints: true },
     paperResult: text('reconstructPresets.figure8Paper'),
     variants: [
       {
@@ -282,7 +278,7 @@ export const CLOUD_PRESETS: CloudPreset[] = [
     ...STEREO_COW,
     params: PAPER,
     photo: 3,
-    view: { points: false },
+    view: { color: 'own', points: false },
     paperResult: text('reconstructPresets.figure9Paper'),
     variants: [
       {

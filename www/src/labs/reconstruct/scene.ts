@@ -7,9 +7,10 @@ import { Legend } from '../../scene/legend';
 import type { PictureSubject } from '../../scene/pictures';
 import type { PinholeCamera } from '../../scene/pinhole';
 import { diverging, isQuantity, QUANTITIES, quantityTitle } from '../../scene/shading';
-import { type SurfaceColor, SurfaceObject } from '../../scene/surface';
+import { SurfaceObject } from '../../scene/surface';
 import { type CameraPose, Viewport } from '../../scene/viewport';
 import { CameraMarks } from './cameras';
+import type { CloudViewOptions } from './view';
 
 /** Fraction of the points ignored at either end of each axis when the view is fitted, so that outliers do not count. */
 const OUTLIER_FRACTION = 0.02;
@@ -21,15 +22,6 @@ const DISC = 0.014;
 /** Number of points above which their discs are drawn smaller, so that they do not cover everything. */
 const MANY = 10_000;
 const CAMERA_LENGTH = 0.12;
-
-export interface CloudViewOptions {
-  surface: boolean;
-  edges: boolean;
-  points: boolean;
-  constraints: boolean;
-  cameras: boolean;
-  color: SurfaceColor;
-}
 
 /** Points to show in the Reconstruct lab's 3D view, their cameras, and the orientation of the view. */
 export interface ShownCloud {

@@ -1,10 +1,11 @@
 import type { Vec3 } from '../../engine/protocol';
-import type { SurfaceColor } from '../../scene/surface';
+import { initialOptions } from '../../kit/view';
 import { text } from '../../texts';
 import { ball, moved, turnedAbout, upright } from './ellipsoids';
 import { type Film, poseAt } from './film';
-import type { Layout, ParamValues, Pose } from './protocol';
+import type { ParamValues, Pose } from './protocol';
 import type { ComputedMesh } from './shapes';
+import { SCULPT_VIEW, type SculptViewOptions } from './view';
 
 /** Source of an example's mesh: a file served with the page, or a computed mesh. */
 export type ExampleMesh = { file: string } | { shape: ComputedMesh };
@@ -29,8 +30,8 @@ export interface SculptExample {
   pose?: Pose;
   film?: Film;
   params: ParamValues;
-  color: SurfaceColor;
-  layout: Layout;
+  /** Options of the view with which the example opens, where they differ from the lab's. */
+  view?: Partial<SculptViewOptions>;
   credit: string;
 }
 
@@ -89,8 +90,6 @@ export const SCENES: [SculptExample, ...SculptExample[]] = [
     names: BUST_NAMES,
     film: { keys: [BUST, LOOKING_ASIDE], between: 24, loop: false },
     params: { supersample: 2 },
-    color: 'plain',
-    layout: 'result',
     credit: NEFERTITI,
   },
   {
@@ -107,8 +106,7 @@ export const SCENES: [SculptExample, ...SculptExample[]] = [
     ],
     film: LAVA,
     params: { edgeMin: 0.07, edgeMax: 0.16, topology: 'split-and-join' },
-    color: 'component',
-    layout: 'result',
+    view: { color: 'component' },
     credit: text('sculptPresets.lavaCredit'),
   },
   {
@@ -121,8 +119,13 @@ export const SCENES: [SculptExample, ...SculptExample[]] = [
     names: [text('sculptPresets.large'), text('sculptPresets.small')],
     pose: [ball(-0.6, 0, 0, 0.85), ball(0.75, 0.3, 0, 0.6)],
     params: {},
-    color: 'texture',
-    layout: 'result',
+    view: { color: 'texture' },
     credit: text('sculptPresets.globeCredit'),
   },
 ];
+
+/** Returns the options of the view with which an example, or else the user's own mesh, opens. */
+export const viewOf = (example: SculptExample | undefined): SculptViewOptions => ({
+  ...initialOptions(SCULPT_VIEW),
+  ...example?.view,
+});

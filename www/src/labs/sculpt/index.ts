@@ -11,7 +11,7 @@ import { LabStates } from '../../lab/states';
 import { text } from '../../texts';
 import { connectSculpt } from './client';
 import { type OpenedPose, SculptData, type SculptOpening, type SculptSource } from './data';
-import type { SculptExample } from './examples';
+import { type SculptExample, viewOf } from './examples';
 import { lastFrame } from './film';
 import { Filming } from './filming';
 import { filmOf, fits, fromHash, linkOf, toHash } from './link';
@@ -21,9 +21,9 @@ import { Posing } from './posing';
 import { isSculptPreset, poseOf, type SculptPreset, type SculptVariant, variantInForce } from './presets';
 import type { FrameContents, FrameEvent, ParamValues, SculptQuantity, Support, WorkerEvent } from './protocol';
 import { SculptResults } from './results';
-import type { SculptViewOptions } from './scene';
 import type { SculptContent } from './schema';
 import { type SculptMoments, SculptSettings } from './settings';
+import type { SculptViewOptions } from './view';
 
 /** The colourings of the surface for which the worker has to compute values at the vertices. */
 const QUANTITIES: readonly string[] = [
@@ -129,7 +129,7 @@ class SculptLab implements RunningLab<SculptExample> {
       else if (Object.is(opened.params[name], value)) this.#usual[name] = example.params[name];
     this.#results.clear();
     this.ui.adopt(opened, example, name, source.warnings);
-    const film = filmOf(linked ?? { params: {} }, example?.film);
+    const film = filmOf(linked ?? {}, example?.film);
     const { support, start, pose, params } = opened;
     this.#settings.adopt({
       support,
@@ -141,17 +141,10 @@ class SculptLab implements RunningLab<SculptExample> {
       film,
       params,
     });
-    const color = linked?.color ?? example?.color ?? 'plain';
-    const layout = linked?.layout ?? example?.layout ?? 'result';
     const preset = isSculptPreset(example) ? example : undefined;
     offerStages(this.ui.options, preset?.stages !== undefined);
-    this.ui.options.set({
-      color,
-      layout: layout === 'stages' && !preset?.stages ? 'result' : layout,
-      edges: false,
-      ellipsoids: true,
-      ...preset?.view,
-    });
+    const view = { ...viewOf(example), ...linked?.view };
+    this.ui.options.set(view.layout === 'stages' && !preset?.stages ? { ...view, layout: 'result' } : view);
     if (preset?.stages) this.#results.showStages(preset.stages);
     if (opened.moments)
       return this.#resume(opened.moments, session && contentOf<SculptContent>(session, 'sculpt').view);
@@ -266,9 +259,9 @@ class SculptLab implements RunningLab<SculptExample> {
 
   address({ example, name: file }: SculptSource): string {
     const { params, support, start, pose: present, posed, film } = this.#settings;
-    const { color, layout } = this.ui.options.value;
+    const { value: view } = this.ui.options;
     const pose = posed ? present : undefined;
-    return toHash(linkOf({ example, file, params, usual: this.#usual, support, start, pose, film, color, layout }));
+    return toHash(linkOf({ example, file, params, usual: this.#usual, support, start, pose, film, view }));
   }
 
   #onEvent(event: WorkerEvent): void {

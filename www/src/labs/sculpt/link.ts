@@ -1,13 +1,12 @@
 /** Converts the Sculpt lab's settings to the hash of an address, `#sculpt?…`, and back. */
 import type { ParamValues } from '../../engine/protocol';
-import { type Field, flag, integer, linkFormat, many, name, oneOf, oneOfChoices } from '../../lab/link-fields';
+import { type Field, flag, integer, linkFormat, many, name, oneOf } from '../../lab/link-fields';
 import { differing } from '../../lab/link-query';
-import type { SurfaceColor } from '../../scene/surface';
 import { fromNumbers, lengthsOf, toNumbers } from './ellipsoids';
-import { SCENES, type SculptExample } from './examples';
+import { SCENES, type SculptExample, viewOf } from './examples';
 import type { Film } from './film';
-import { LAYOUTS, SCULPT_COLORS } from './panels/options';
-import type { Layout, Pose, Support } from './protocol';
+import type { Pose, Support } from './protocol';
+import { SCULPT_VIEW, type SculptViewOptions } from './view';
 
 const ADDRESS = '#sculpt';
 /** Most keyframes that a link includes: some programs truncate long addresses. */
@@ -40,17 +39,20 @@ export interface LinkedScene {
   keys?: Pose[];
   between?: number;
   loop?: boolean;
-  color?: SurfaceColor;
-  layout?: Layout;
+  view: Partial<SculptViewOptions>;
   unread?: string[];
 }
 
 const pose: Field<Pose> = { read: asPose, write: asText };
 
-const FORMAT = linkFormat(ADDRESS, {
-  ...{ example: name, file: name, support: oneOf(['surface', 'membrane']), color: oneOfChoices(SCULPT_COLORS) },
-  ...{ layout: oneOfChoices(LAYOUTS), between: integer(1), loop: flag, rest: pose, pose, key: many(pose, MOST_KEYS) },
-});
+const FORMAT = linkFormat(
+  ADDRESS,
+  {
+    ...{ example: name, file: name, support: oneOf(['surface', 'membrane']), between: integer(1), loop: flag },
+    ...{ rest: pose, pose, key: many(pose, MOST_KEYS) },
+  },
+  SCULPT_VIEW,
+);
 
 /** Present settings of the Sculpt lab, from which a link is made. */
 export interface SceneSettings {
@@ -64,8 +66,7 @@ export interface SceneSettings {
   start: Pose;
   pose: Pose | undefined;
   film: Film | undefined;
-  color: SurfaceColor;
-  layout: Layout;
+  view: SculptViewOptions;
 }
 
 /**
@@ -73,7 +74,7 @@ export interface SceneSettings {
  * parameters that differ from `usual`; keyframes only if there are at most {@link MOST_KEYS}.
  */
 export function linkOf(settings: SceneSettings): LinkedScene {
-  const { example, file, params, usual, support, start, pose, film, color, layout } = settings;
+  const { example, file, params, usual, support, start, pose, film, view } = settings;
   const own =
     film !== example?.film && film && 'keys' in film && film.keys.length <= MOST_KEYS && film.keys.every(fits);
   const looped = film?.loop !== undefined && film.loop !== (example?.film?.loop ?? false);
@@ -85,8 +86,7 @@ export function linkOf(settings: SceneSettings): LinkedScene {
     ...(pose && fits(pose) && { pose }),
     ...(own && { keys: film.keys, between: film.between }),
     ...(looped && { loop: film.loop }),
-    ...(color !== (example?.color ?? 'plain') && { color }),
-    ...(layout !== (example?.layout ?? 'result') && { layout }),
+    view: differing({ ...view }, { ...viewOf(example) }),
   };
 }
 
@@ -101,7 +101,10 @@ function withBothEdges(linked: ParamValues, params: ParamValues): ParamValues {
  * Returns the film for the settings in a link: of the link's keyframes or, if it has none, `usual`, the example's film;
  * the link may also set whether the film loops.
  */
-export function filmOf({ keys, between, loop }: LinkedScene, usual: Film | undefined): Film | undefined {
+export function filmOf(
+  { keys, between, loop }: Pick<LinkedScene, 'keys' | 'between' | 'loop'>,
+  usual: Film | undefined,
+): Film | undefined {
   const film = keys && keys.length > 0 ? { keys, between: between ?? 24, loop: false } : usual;
   return film && loop !== undefined ? { ...film, loop } : film;
 }

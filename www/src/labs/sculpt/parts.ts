@@ -7,6 +7,7 @@ import type { History } from '../../kit/history';
 import { MeasurePanel } from '../../kit/measures';
 import { Plots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
+import { initialOptions } from '../../kit/view';
 import { OptionControls } from '../../kit/view-options';
 import { LabPage } from '../../lab/page';
 import { RunControls, type RunEvents } from '../../lab/run-controls';
@@ -20,14 +21,13 @@ import { ACCEPT } from './mesh-files';
 import { factsOf, sceneData } from './page';
 import { EllipsoidControls, type EllipsoidEvents } from './panels/ellipsoids';
 import { FilmControls, type FilmEvents } from './panels/film';
-import { offerLayouts, offerTexture, SCULPT_OPTIONS } from './panels/options';
+import { offerLayouts, offerTexture } from './panels/options';
 import { SupportControl } from './panels/support';
 import { pictureOf } from './picture';
 import { posesOf, type SculptPreset, type SculptVariant } from './presets';
 import type { MeshTexture, OpenedScene, ParamValues, Support } from './protocol';
-import { SculptureView, type SculptViewOptions } from './scene';
-
-const INITIAL_VIEW: SculptViewOptions = { layout: 'result', edges: false, ellipsoids: true, color: 'plain' };
+import { SculptureView } from './scene';
+import { SCULPT_VIEW, type SculptViewOptions } from './view';
 
 /** Parameters that have an effect on a membrane alone. */
 const OF_MEMBRANES = ['levels', 'refineFactor', 'smoothing', 'distribute', 'supersample', 'energy', 'topology'];
@@ -48,7 +48,7 @@ export class SculptParts {
   readonly latency = new DragLatency();
   readonly measures = new MeasurePanel(SCULPT_ROWS);
   readonly previewNote = h('p', { class: 'coarse', hidden: true }, text('sculpt.coarsePreview'));
-  readonly options: OptionControls<SculptViewOptions>;
+  readonly options: OptionControls<typeof SCULPT_VIEW>;
   readonly ellipsoids: EllipsoidControls;
   readonly film: FilmControls;
   readonly support: SupportControl;
@@ -72,7 +72,7 @@ export class SculptParts {
       fetchMesh: (request) => client.request('export', request),
       residual: 'unrest',
     });
-    this.view = new SculptureView(this.page.canvas, INITIAL_VIEW);
+    this.view = new SculptureView(this.page.canvas, initialOptions(SCULPT_VIEW));
     this.carrier = new SurfaceCarrier(this.view);
     this.#onError = events.onError;
     this.#figure = new FigurePanel<SculptVariant, SculptPreset>(events.onVariant);
@@ -80,7 +80,7 @@ export class SculptParts {
     this.film = new FilmControls(events);
     this.support = new SupportControl(events.onSupport);
     this.plots = new Plots(history, SCULPT_PLOTS, true);
-    this.options = new OptionControls(SCULPT_OPTIONS, INITIAL_VIEW, (options) => {
+    this.options = new OptionControls(SCULPT_VIEW, (options) => {
       this.view.setOptions(options);
       events.onOptions(options);
     });

@@ -7,7 +7,6 @@ import { ball, moved, samePose, scaled, turned, upright } from './ellipsoids';
 import { BUST, BUST_MESHES, BUST_NAMES, LAVA, LOOKING_ASIDE, NEFERTITI, SCENES, type SculptExample } from './examples';
 import { poseAt } from './film';
 import type { ParamValues, Pose, StageKind } from './protocol';
-import type { SculptViewOptions } from './scene';
 
 /**
  * Expected result of a preset's variant once its pose is reached, as ranges, each from least to largest; tests compute
@@ -36,7 +35,6 @@ export interface SculptPreset extends SculptExample {
   paperResult: string;
   variants: [SculptVariant, ...SculptVariant[]];
   hint?: string;
-  view?: Partial<SculptViewOptions>;
   /** Series of restructuring stages to display instead of the model's meshes; undefined to display the model. */
   stages?: StageKind;
 }
@@ -47,7 +45,6 @@ const BUST_SCENE = {
   start: BUST,
   names: BUST_NAMES,
   params: { supersample: 2 },
-  color: 'plain',
   credit: NEFERTITI,
 } as const;
 
@@ -63,7 +60,7 @@ const LONG_NECK = bustWith((one, index) => {
 
 const WIDE_CROWN = bustWith((one, index) => (index === 0 ? scaled(one, [1.45, 1, 1.25]) : one));
 
-const BALL_SCENE = { up: 'y', color: 'plain', params: {} } as const;
+const BALL_SCENE = { up: 'y', params: {} } as const;
 const ONE_BALL: Pose = [ball(0, 0, 0, 0.98)];
 /**
  * Start pose of the globe in figure 10: three ellipsoids in the same place; when they separate, each takes its part of
@@ -85,8 +82,7 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     id: 'figure-1',
     name: text('sculptPresets.figure1Name'),
     ...BUST_SCENE,
-    layout: 'row',
-    view: { ellipsoids: false },
+    view: { layout: 'row', ellipsoids: false },
     paperResult: text('sculptPresets.figure1Paper'),
     variants: [
       {
@@ -106,7 +102,7 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     ...BALL_SCENE,
     base: { shape: 'ball' },
     start: ONE_BALL,
-    layout: 'stages',
+    view: { layout: 'stages' },
     credit: text('sculptPresets.figure3Credit'),
     paperResult: text('sculptPresets.figure3Paper'),
     variants: [
@@ -125,7 +121,7 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     ...BALL_SCENE,
     base: { shape: 'ball' },
     start: ONE_BALL,
-    layout: 'stages',
+    view: { layout: 'stages' },
     credit: text('sculptPresets.figure6Credit'),
     paperResult: text('sculptPresets.figure6Paper'),
     variants: [
@@ -147,8 +143,6 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     names: SCENES.find(({ id }) => id === 'lava')?.names ?? [],
     film: LAVA,
     params: { edgeMin: 0.07, edgeMax: 0.16, topology: 'split-and-join' },
-    color: 'plain',
-    layout: 'result',
     credit: text('sculptPresets.figure7Credit'),
     paperResult: text('sculptPresets.figure7Paper'),
     variants: [
@@ -168,7 +162,7 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     ...BALL_SCENE,
     start: BLOBS,
     names: [text('sculptPresets.large'), text('sculptPresets.small')],
-    layout: 'levels',
+    view: { layout: 'levels' },
     params: { edgeMin: 0.05, edgeMax: 0.115, levels: 2, refineFactor: 0.5 },
     credit: text('sculptPresets.figure8Credit'),
     paperResult: text('sculptPresets.figure8Paper'),
@@ -186,8 +180,7 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     id: 'figure-9',
     name: text('sculptPresets.figure9Name'),
     ...BUST_SCENE,
-    layout: 'pair',
-    view: { ellipsoids: false },
+    view: { layout: 'pair', ellipsoids: false },
     paperResult: text('sculptPresets.figure9Paper'),
     variants: [
       {
@@ -224,9 +217,7 @@ export const SCULPT_PRESETS: SculptPreset[] = [
     start: GLOBE_START,
     names: [text('sculptPresets.west'), text('sculptPresets.middle'), text('sculptPresets.east')],
     params: {},
-    color: 'texture',
-    layout: 'pair',
-    view: { ellipsoids: false },
+    view: { color: 'texture', layout: 'pair', ellipsoids: false },
     credit: text('sculptPresets.figure10Credit'),
     paperResult: text('sculptPresets.figure10Paper'),
     variants: [

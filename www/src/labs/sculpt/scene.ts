@@ -5,12 +5,13 @@ import { EditedView } from '../../scene/edited-view';
 import { Legend } from '../../scene/legend';
 import type { PictureSubject } from '../../scene/pictures';
 import { diverging, isQuantity, QUANTITIES, quantityTitle } from '../../scene/shading';
-import { type SurfaceColor, SurfaceObject } from '../../scene/surface';
+import { SurfaceObject } from '../../scene/surface';
 import { type CameraPose, Viewport } from '../../scene/viewport';
 import { text } from '../../texts';
 import { boxOf } from './ellipsoids';
 import { EllipsoidHandles, type HandleMode } from './handles';
 import type { ControlEllipsoid, Layout, Pose } from './protocol';
+import type { SculptViewOptions } from './view';
 
 /** Distance between the centres of adjacent meshes shown in a row, relative to their width. */
 const ROW_SPACING = 1.25;
@@ -19,13 +20,6 @@ const ROW_SPACING = 1.25;
  * front.
  */
 const VIEW_ANGLE = 0.35;
-
-export interface SculptViewOptions {
-  layout: Layout;
-  edges: boolean;
-  ellipsoids: boolean;
-  color: SurfaceColor;
-}
 
 /**
  * Names of the meshes that the Sculpt lab's view can show: as in the paper, with `dash` for the prime of the deformed

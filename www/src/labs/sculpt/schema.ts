@@ -2,8 +2,22 @@
 
 import { type InferOutput, literal, minLength, object, optional, pipe, strictTuple, union, variant } from 'valibot';
 import type { ContentOf } from '../../lab/session/check';
-import { call, camera, color, history, log, markMismatch, session, states, steps } from '../../lab/session/parts';
-import { between, bytes, count, flag, list, maybe, name, oneOf, params, text, vec3 } from '../../lab/session/values';
+import { call, camera, history, log, markMismatch, session, states, steps } from '../../lab/session/parts';
+import {
+  between,
+  bytes,
+  count,
+  flag,
+  list,
+  maybe,
+  name,
+  oneOf,
+  params,
+  text,
+  vec3,
+  viewOptions,
+} from '../../lab/session/values';
+import { SCULPT_VIEW } from './view';
 
 const pose = list(object({ center: vec3, axes: strictTuple([vec3, vec3, vec3]) }), 1000);
 const keys = pipe(list(pose, 1000), minLength(1));
@@ -18,8 +32,7 @@ const moment = {
   model: object({ start: pose, support, iteration: count, frame: count, log: optional(text(100)) }),
   page: object({ names: list(name, 1000), posed: flag, film: maybe(film), history }),
 };
-const layout = oneOf({ result: true, base: true, pair: true, row: true, levels: true, stages: true });
-const view = object({ camera, options: object({ layout, edges: flag, ellipsoids: flag, color }) });
+const view = object({ camera, options: viewOptions(SCULPT_VIEW) });
 
 /** The lab's own part of a session: its model, history, undo and view. */
 export type SculptContent = ContentOf<typeof schema>;

@@ -5,6 +5,7 @@ import { nameOf, readFiles } from '../../importers/files';
 
 import type { Shortcut } from '../../kit/shortcuts';
 import type { LabState } from '../../kit/state';
+import { initialOptions } from '../../kit/view';
 import type { Lab, LabPlace } from '../../lab/lab';
 import { Opening } from '../../lab/opening';
 import { contentOf } from '../../lab/session/content';
@@ -17,7 +18,7 @@ import { SegmentData, type SegmentOpening, type SegmentSource } from './data';
 import { SegmentEditing } from './editing';
 import type { SegmentExample } from './examples';
 import type { Overlays } from './label-overlay';
-import { INITIAL_VIEW, linkOf, toHash } from './link';
+import { linkOf, toHash } from './link';
 import { factsOf, MAP_FACT } from './page';
 import type { LabelMeasures } from './panels/label-measures';
 import { type Tool, type ToolSettings, usesRange } from './panels/tools';
@@ -25,6 +26,7 @@ import { type PartEvents, SegmentParts, type SurfaceFormat } from './parts';
 import type { OpenedImage, OpenedLabels, ParamValues, SurfaceUpdate, VolumeView, WorkerEvent } from './protocol';
 import { saveMap, saveSurfaces } from './saving';
 import type { SegmentContent } from './schema';
+import { SEGMENT_VIEW } from './view';
 
 /** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
 const MASK_DELAY = 120;
@@ -202,7 +204,7 @@ class SegmentLab implements ShelledLab<SegmentExample> {
     else {
       this.#editing.adopt(volume, opened, example?.labels ?? []);
       this.ui.tools.set({ range: example?.range ?? [...volume.window] });
-      this.ui.options.set({ ...INITIAL_VIEW, ...linked?.view });
+      this.ui.options.set({ ...initialOptions(SEGMENT_VIEW), ...linked?.view });
     }
     before.forEach(release);
     this.#applyTool(this.ui.tools.value);

@@ -1,14 +1,12 @@
 /** Converts the Segment lab's settings to the hash of an address, `#segment?…`, and back. */
 import type { ParamValues } from '../../engine/protocol';
-import { PLACEMENTS } from '../../kit/view-options';
-import { among, flag, linkFormat, name, oneOfChoices, real } from '../../lab/link-fields';
+import { initialOptions } from '../../kit/view';
+import { linkFormat, name } from '../../lab/link-fields';
 import { differing } from '../../lab/link-query';
 import { SEGMENT_EXAMPLES, type SegmentExample } from './examples';
-import type { SegmentViewOptions } from './scene';
+import { SEGMENT_VIEW, type SegmentViewOptions } from './view';
 
 const ADDRESS = '#segment';
-
-export const INITIAL_VIEW: SegmentViewOptions = { edges: false, outlines: true, slices: 'walls', opacity: 0.5 };
 
 /** Settings of the Segment lab that are contained in a link; missing ones are as by default. */
 export interface LinkedSegment {
@@ -20,8 +18,7 @@ export interface LinkedSegment {
   unread?: string[];
 }
 
-const VIEW = { edges: flag, outlines: flag, slices: oneOfChoices(PLACEMENTS), opacity: real() };
-const FORMAT = linkFormat(ADDRESS, { example: name, file: name, ...VIEW });
+const FORMAT = linkFormat(ADDRESS, { example: name, file: name }, SEGMENT_VIEW);
 
 /** Present settings of the Segment lab, from which a link is made. */
 export interface LinkableSegment {
@@ -39,19 +36,12 @@ export function linkOf({ example, file, params, defaults, view }: LinkableSegmen
     ...(!example && { file }),
     ...(example && example !== SEGMENT_EXAMPLES[0] && { example: example.id }),
     params: differing(params, defaults),
-    view: differing({ ...view }, { ...INITIAL_VIEW }),
+    view: differing({ ...view }, { ...initialOptions(SEGMENT_VIEW) }),
   };
 }
 
 /** Converts the settings in a link to the hash of an address. */
-export const toHash = ({ view, ...settings }: LinkedSegment): string => FORMAT.toHash({ ...settings, ...view });
+export const toHash = (linked: LinkedSegment): string => FORMAT.toHash(linked);
 
 /** Parses the hash of an address; undefined if it is for another lab or contains no settings. */
-export function fromHash(hash: string): LinkedSegment | undefined {
-  const found = FORMAT.fromHash(hash);
-  if (!found) return undefined;
-  return {
-    ...among(found, ['example', 'file', 'params', 'unread']),
-    view: among(found, ['edges', 'outlines', 'slices', 'opacity']),
-  };
-}
+export const fromHash = (hash: string): LinkedSegment | undefined => FORMAT.fromHash(hash);

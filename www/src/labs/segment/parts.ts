@@ -2,18 +2,18 @@ import { fileChooser } from '../../importers/files';
 import { h, section, wideButton } from '../../kit/dom';
 import { RecentreOffer } from '../../kit/exports';
 import type { LabState } from '../../kit/state';
+import { initialOptions } from '../../kit/view';
 import { OptionControls } from '../../kit/view-options';
 import { type LabEvents, LabPage } from '../../lab/page';
 import { text } from '../../texts';
 import type { SegmentExample } from './examples';
-import { INITIAL_VIEW } from './link';
 import { segmentData } from './page';
 import { LabelList, type LabelListEvents } from './panels/label-list';
 import { LabelMeasureTable } from './panels/label-measures';
-import { SEGMENT_OPTIONS } from './panels/options';
 import { SegmentTools, type ToolEvents } from './panels/tools';
 import type { ParamValues, VolumeFormat } from './protocol';
-import { SegmentView, type SegmentViewEvents, type SegmentViewOptions } from './scene';
+import { SegmentView, type SegmentViewEvents } from './scene';
+import { SEGMENT_VIEW } from './view';
 
 /** Formats in which the surfaces of all labels are saved, one file a label in a ZIP archive, or all in one GLB. */
 export type SurfaceFormat = 'ply' | 'stl' | 'obj' | 'glb';
@@ -45,7 +45,7 @@ export class SegmentParts {
   readonly #slices = h('div', { class: 'slices' });
   readonly view: SegmentView;
   readonly measures = new LabelMeasureTable();
-  readonly options: OptionControls<SegmentViewOptions>;
+  readonly options: OptionControls<typeof SEGMENT_VIEW>;
   readonly labels: LabelList;
   readonly tools: SegmentTools;
   readonly offer = new RecentreOffer();
@@ -63,8 +63,8 @@ export class SegmentParts {
       data: segmentData(choosers, events.onExample),
       sessionHelp: text('segment.sessionHelp'),
     });
-    this.view = new SegmentView(this.page.canvas, this.#slices, INITIAL_VIEW, events);
-    this.options = new OptionControls(SEGMENT_OPTIONS, INITIAL_VIEW, (options) => {
+    this.view = new SegmentView(this.page.canvas, this.#slices, initialOptions(SEGMENT_VIEW), events);
+    this.options = new OptionControls(SEGMENT_VIEW, (options) => {
       this.view.setOptions(options);
       events.onOptions();
     });

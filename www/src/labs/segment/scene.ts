@@ -1,7 +1,6 @@
 import type { Raycaster } from 'three';
 import type { Surface, Vec3, VolumeView } from '../../engine/protocol';
 import { onSchemeChange, token } from '../../kit/dom';
-import type { SlicePlacement } from '../../kit/view-options';
 import { type Axis, nearestVoxel, toWorld } from '../../scene/anatomy';
 import { type Grip, SlicePanel } from '../../scene/panel';
 import type { PictureSubject } from '../../scene/pictures';
@@ -11,15 +10,7 @@ import { VolumeScene } from '../../scene/volume-scene';
 import { count, text } from '../../texts';
 import { LabelOutlines } from './label-outlines';
 import { LabelPicture, type Overlays } from './label-overlay';
-
-export interface SegmentViewOptions {
-  edges: boolean;
-  /** Whether the outlines of the surfaces are drawn on the slices. */
-  outlines: boolean;
-  slices: SlicePlacement;
-  /** Opacity of the labels on the slices, 0..1. */
-  opacity: number;
-}
+import type { SegmentViewOptions } from './view';
 
 export interface SegmentViewEvents {
   /** Called when a slice across `axis` is pressed, with the position in voxels; a returned grip follows the pointer. */

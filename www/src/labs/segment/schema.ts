@@ -5,8 +5,6 @@ import {
   custom,
   type InferOutput,
   literal,
-  maxValue,
-  minValue,
   number,
   object,
   optional,
@@ -18,8 +16,9 @@ import {
 } from 'valibot';
 import { type LabelArray, rangeOf } from '../../engine/labels';
 import type { ContentOf } from '../../lab/session/check';
-import { camera, placement, session } from '../../lab/session/parts';
-import { bytes, flag, list, name, oneOf, params, real, vec3 } from '../../lab/session/values';
+import { camera, session } from '../../lab/session/parts';
+import { bytes, flag, list, name, oneOf, params, real, vec3, viewOptions } from '../../lab/session/values';
+import { SEGMENT_VIEW } from './view';
 
 const voxels = custom<LabelArray>(
   (value) => ArrayBuffer.isView(value) && 'BYTES_PER_ELEMENT' in value && !/Float|Big/.test(value.constructor.name),
@@ -36,11 +35,7 @@ const tools = object({
   extent: oneOf({ slice: true, box: true }),
   ...{ radius: real, range, reach: real, inRange: flag, protect: flag },
 });
-const opacity = pipe(number(), minValue(0), maxValue(1));
-const view = object({
-  ...{ camera, crosshair: vec3 },
-  options: object({ edges: flag, outlines: flag, slices: placement, opacity }),
-});
+const view = object({ camera, crosshair: vec3, options: viewOptions(SEGMENT_VIEW) });
 /** Files may have 4000, and a few may be added. */
 const most = 4500;
 

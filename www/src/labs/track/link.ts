@@ -1,25 +1,11 @@
 /** Converts the Track lab's settings to the hash of an address, `#track?…`, and back. */
 import type { ParamValues, Vec3 } from '../../engine/protocol';
-import { PLACEMENTS } from '../../kit/view-options';
-import {
-  among,
-  as,
-  type Field,
-  flag,
-  integer,
-  linkFormat,
-  name,
-  numbers,
-  oneOf,
-  oneOfChoices,
-  point,
-} from '../../lab/link-fields';
+import { among, as, type Field, flag, integer, linkFormat, name, numbers, oneOf, point } from '../../lab/link-fields';
 import { differing, readValue } from '../../lab/link-query';
 import { IMAGES, OWN_PREPARATION, type TrackExample } from './examples';
-import { BELOW, VOTES } from './panels/options';
 import { viewOf } from './presets';
 import type { Box, Cavity, Preparation, Setup } from './protocol';
-import type { TrackViewOptions } from './scene';
+import { TRACK_VIEW, type TrackViewOptions } from './view';
 
 const ADDRESS = '#track';
 
@@ -55,16 +41,13 @@ const binning = as(
 );
 
 const PREPARATION = { binning, enrichment: oneOf(['none', 'linear', 'flow']), factor: integer(0) };
-const VIEW = {
-  ...{ surface: flag, edges: flag, region: flag, votes: oneOfChoices(VOTES) },
-  ...{ slices: oneOfChoices(PLACEMENTS), below: oneOfChoices(BELOW) },
-};
 const FORMAT = linkFormat(
   ADDRESS,
   {
-    ...{ example: name, file: name, ...PREPARATION, ...VIEW },
+    ...{ example: name, file: name, ...PREPARATION },
     ...{ box: orWord('whole', box), at: orWord('largest', point), cavity: oneOf(['closed', 'open']) },
   },
+  TRACK_VIEW,
   paramOf,
 );
 
@@ -120,18 +103,16 @@ export function isChosen({ box, at }: Pick<LinkedTrack, 'box' | 'at'> | Setup): 
 }
 
 /** Converts the settings in a link to the hash of an address, with all digits, which give the same surfaces to the bit. */
-export const toHash = ({ preparation, view, ...settings }: LinkedTrack): string =>
-  FORMAT.toHash({ ...settings, ...preparation, ...view });
+export const toHash = ({ preparation, ...settings }: LinkedTrack): string =>
+  FORMAT.toHash({ ...settings, ...preparation });
 
 /** Parses the hash of an address; undefined if it is for another lab or contains no settings. */
 export function fromHash(hash: string): LinkedTrack | undefined {
   const found = FORMAT.fromHash(hash);
   if (!found) return undefined;
-  return {
-    ...among(found, ['example', 'file', 'params', 'box', 'at', 'cavity', 'unread']),
-    preparation: among(found, ['binning', 'enrichment', 'factor']),
-    view: among(found, ['surface', 'edges', 'region', 'votes', 'slices', 'below']),
-  };
+  const { binning, enrichment, factor, ...settings } = found;
+  const preparation = among({ binning, enrichment, factor }, ['binning', 'enrichment', 'factor']);
+  return { ...settings, preparation };
 }
 
 function paramOf(text: string): unknown {

@@ -5,6 +5,7 @@ import { FigurePanel } from '../../kit/figure';
 import type { History } from '../../kit/history';
 import { MeasurePanel } from '../../kit/measures';
 import type { LabState } from '../../kit/state';
+import { initialOptions } from '../../kit/view';
 import { OptionControls } from '../../kit/view-options';
 import { LabPage } from '../../lab/page';
 import { RunControls, type RunEvents } from '../../lab/run-controls';
@@ -21,22 +22,13 @@ import { FigureRow } from './panels/figure-row';
 import { FrameBar } from './panels/frame-bar';
 import { FrameTable } from './panels/frame-table';
 import { ObjectChoice, type ObjectEvents } from './panels/object-choice';
-import { TRACK_OPTIONS } from './panels/options';
 import { PreparationControls } from './panels/preparation';
 import { RegionControls, type RegionEvents } from './panels/region';
 import { VolumeCurve } from './panels/volume-curve';
 import type { TrackPreset, TrackVariant } from './presets';
 import type { Alternative, OpenedImage, ParamSpec, ParamValues, Preparation, Vec3 } from './protocol';
-import { TrackView, type TrackViewOptions } from './scene';
-
-export const INITIAL_VIEW: TrackViewOptions = {
-  surface: true,
-  edges: false,
-  votes: 'none',
-  region: true,
-  slices: 'walls',
-  below: 'slices',
-};
+import { TrackView } from './scene';
+import { TRACK_VIEW, type TrackViewOptions } from './view';
 
 export interface PartEvents extends RunEvents<TrackExample>, RegionEvents, ObjectEvents {
   onVariant: (preset: TrackPreset, variant: TrackVariant) => void;
@@ -59,7 +51,7 @@ export class TrackParts {
   readonly view: TrackView;
   readonly measures = new MeasurePanel(TRACK_ROWS);
   readonly table = new FrameTable();
-  readonly options: OptionControls<TrackViewOptions>;
+  readonly options: OptionControls<typeof TRACK_VIEW>;
   readonly preparation: PreparationControls;
   readonly region: RegionControls;
   readonly object: ObjectChoice;
@@ -94,7 +86,7 @@ export class TrackParts {
       suffix: () => `-${this.frames.frame + 1}`,
       concerningSurface: (warnings) => concerning(warnings, { frame: this.frames.frame }),
     });
-    this.view = new TrackView(this.page.canvas, this.#slices, INITIAL_VIEW);
+    this.view = new TrackView(this.page.canvas, this.#slices, initialOptions(TRACK_VIEW));
     this.#onParam = events.onParam;
     this.#figure = new FigurePanel<TrackVariant, TrackPreset>(events.onVariant);
     this.preparation = new PreparationControls(events.onPreparation);
@@ -118,7 +110,7 @@ export class TrackParts {
       wideButton(text('track.saveTable'), 'save-table', () => events.onSave('table')),
     ];
     this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
-    this.options = new OptionControls(TRACK_OPTIONS, INITIAL_VIEW, (options) => {
+    this.options = new OptionControls(TRACK_VIEW, (options) => {
       this.view.setOptions(options);
       this.#slices.hidden = options.below !== 'slices';
       this.stills.below = options.below;

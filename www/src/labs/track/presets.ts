@@ -4,9 +4,10 @@
  */
 
 import type { ParamValues } from '../../engine/protocol';
+import { initialOptions } from '../../kit/view';
 import { text } from '../../texts';
 import { HEART, IMAGES, type TrackExample } from './examples';
-import type { TrackViewOptions } from './scene';
+import { TRACK_VIEW, type TrackViewOptions } from './view';
 
 /** One picture of a figure, as a variant of the preset: the same image with other parameters and view options. */
 export interface TrackVariant {
@@ -24,15 +25,6 @@ export interface TrackPreset extends TrackExample {
   variants: [TrackVariant, ...TrackVariant[]];
   hint?: string;
 }
-
-const PLAIN_VIEW: TrackViewOptions = {
-  surface: true,
-  edges: false,
-  votes: 'none',
-  region: true,
-  slices: 'walls',
-  below: 'slices',
-};
 
 export const TRACK_PRESETS: TrackPreset[] = [
   {
@@ -128,7 +120,7 @@ export const TRACK_PRESETS: TrackPreset[] = [
 
 /** Returns the view options that an example opens with; those of a preset are from its first variant. */
 export function viewOf(example: TrackExample | undefined): TrackViewOptions {
-  return { ...PLAIN_VIEW, ...(isTrackPreset(example) && example.variants[0].view) };
+  return { ...initialOptions(TRACK_VIEW), ...(isTrackPreset(example) && example.variants[0].view) };
 }
 
 /** Returns the Track lab's example or preset with this id, undefined if there is none. */

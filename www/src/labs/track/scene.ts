@@ -1,7 +1,6 @@
 import { Box3, Vector3 } from 'three';
 import type { LevelView, Surface, Vec3, VolumeView } from '../../engine/protocol';
 import { onSchemeChange, token } from '../../kit/dom';
-import type { SlicePlacement } from '../../kit/view-options';
 import { type Axis, nearestVoxel, slicePlane, toWorld } from '../../scene/anatomy';
 import { PointCloud } from '../../scene/cloud';
 import { crossSection } from '../../scene/cross-section';
@@ -18,25 +17,11 @@ import type { VoxelBox } from './box';
 import { sliceVotes } from './clusters';
 import type { BoundaryVotes } from './protocol';
 import { RegionGrips, regionEdges } from './region';
+import type { TrackViewOptions } from './view';
 import { drawFaces, drawVotes, voteColors, votesNear } from './votes';
 
 /** Content below the Track lab's 3D view: the slices, or one of the paper's figures. */
 export type ContentBelow = 'slices' | 'boundary' | 'time' | 'between';
-
-/**
- * Boundary votes that are shown: none, those near the surface (all if the frame has no surface), or all in the region
- * of interest.
- */
-export type VisibleVotes = 'none' | 'near' | 'all';
-
-export interface TrackViewOptions {
-  surface: boolean;
-  edges: boolean;
-  votes: VisibleVotes;
-  region: boolean;
-  slices: SlicePlacement;
-  below: ContentBelow;
-}
 
 /** Diameter of the disc that marks a boundary vote, as a fraction of the voxel's shortest side. */
 const DISC = 1.1;

@@ -14,7 +14,7 @@ import {
 } from 'valibot';
 import type { Surface } from '../../engine/protocol';
 import type { ContentOf } from '../../lab/session/check';
-import { call, camera, history, log, markMismatch, placement, session, states, steps } from '../../lab/session/parts';
+import { call, camera, history, log, markMismatch, session, states, steps } from '../../lab/session/parts';
 import {
   anyNumber,
   between,
@@ -27,7 +27,9 @@ import {
   params,
   real,
   vec3,
+  viewOptions,
 } from '../../lab/session/values';
+import { TRACK_VIEW } from './view';
 
 const enrichment = oneOf({ none: true, linear: true, flow: true });
 const setup = object({
@@ -79,12 +81,7 @@ const error = object({ mean: anyNumber, p95: anyNumber });
 const measures = object({ info, report: optional(validity) });
 const frame = object({ surface, facts, measures, error: maybe(error) });
 
-const votes = oneOf({ none: true, near: true, all: true });
-const below = oneOf({ slices: true, boundary: true, time: true, between: true });
-const view = object({
-  ...{ camera, crosshair: vec3, frame: optional(count) },
-  options: object({ surface: flag, edges: flag, votes, region: flag, slices: placement, below }),
-});
+const view = object({ camera, crosshair: vec3, frame: optional(count), options: viewOptions(TRACK_VIEW) });
 
 /** The lab's own part of a session: its model, history, undo and view. */
 export type TrackContent = ContentOf<typeof schema>;

@@ -1,37 +1,7 @@
-import type { Choice } from '../../../kit/field';
-import type { OptionControls, ViewOption } from '../../../kit/view-options';
-import type { SurfaceColor } from '../../../scene/surface';
-import { text } from '../../../texts';
-import type { Layout } from '../protocol';
-import type { SculptViewOptions } from '../scene';
+import type { OptionControls } from '../../../kit/view-options';
+import type { SCULPT_VIEW } from '../view';
 
-export const LAYOUTS: Choice<Layout>[] = [
-  { value: 'result', label: text('sculptPanels.layoutResult') },
-  { value: 'base', label: text('sculptPanels.layoutBase') },
-  { value: 'pair', label: text('sculptPanels.layoutPair') },
-  { value: 'row', label: text('sculptPanels.layoutRow') },
-  { value: 'levels', label: text('sculptPanels.layoutLevels') },
-  { value: 'stages', label: text('sculptPanels.layoutStages') },
-];
-
-export const SCULPT_COLORS: Choice<SurfaceColor>[] = [
-  { value: 'plain', label: text('controls.colorPlain') },
-  { value: 'texture', label: text('sculptPanels.colorTexture') },
-  { value: 'component', label: text('controls.colorComponent') },
-  { value: 'area distortion', label: text('sculptPanels.colorAreaDistortion') },
-  { value: 'angle distortion', label: text('sculptPanels.colorAngleDistortion') },
-  { value: 'mean curvature', label: text('controls.colorMeanCurvature') },
-];
-
-/** View options of the Sculpt lab: which meshes and ellipsoids are shown, and the surfaces' colouring. */
-export const SCULPT_OPTIONS: ViewOption<SculptViewOptions>[] = [
-  { name: 'edges', label: text('controls.viewWireframe') },
-  { name: 'ellipsoids', label: text('sculptPanels.ellipsoids') },
-  { name: 'layout', label: text('sculptPanels.show'), choices: LAYOUTS },
-  { name: 'color', label: text('controls.color'), choices: SCULPT_COLORS },
-];
-
-type Controls = OptionControls<SculptViewOptions>;
+type Controls = OptionControls<typeof SCULPT_VIEW>;
 
 /** Offers the layout of stages of restructuring if there are any. */
 export const offerStages = (controls: Controls, areThere: boolean): void =>
