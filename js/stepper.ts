@@ -58,8 +58,7 @@ export interface RunOptions {
    */
   maxIterations?: number;
   /**
-   * Duration of a slice of work before yielding to the event loop, milliseconds; default 12. Steps of `ImplicitSurface`
-   * and `MultiresolutionModel` are not interrupted.
+   * Duration of a slice of work before yielding to the event loop, milliseconds; default 12.
    */
   budgetMs?: number;
   /** Called with the report of every iteration. If it throws, the run ends and rejects with that error. */

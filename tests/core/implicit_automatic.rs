@@ -169,6 +169,57 @@ fn a_cavity_stays_hollow() {
     assert!((volume(&surface) / expected - 1.0).abs() < 0.02, "{} for {expected}", volume(&surface));
 }
 
+/// A wall as thin as the points are apart looks like one sheet with noise, but its distances from the surface have two values.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn a_surface_between_two_sheets_gives_a_warning() {
+    for (inner, count) in [(0.9, 2000), (0.85, 1000)] {
+        let points = noisy(sphere, count, 0.0, 1).into_iter().enumerate();
+        let shell = points.map(|(i, p)| if i % 2 == 0 { p } else { p * inner }).collect();
+        let mut surface = finished(shell);
+        // The cavity is lost.
+        assert_eq!(euler_of_parts(surface.surface()), [2]);
+        let warnings = surface.step().unwrap().warnings;
+        let [Warning { code: WarningCode::ThinParts, place: Some(Place::Point(p)), .. }] = warnings[..]
+        else {
+            panic!("{inner}: {warnings:?}")
+        };
+        assert!((DVec3::from(p).length() - 1.0).abs() < 0.2, "{p:?}");
+    }
+    // Noise is of one sheet, also where it is as likely anywhere within its bounds.
+    let mut random = Random(3);
+    let uniform =
+        noisy(sphere, 1500, 0.0, 1).into_iter().map(|p| p * (1.0 + random.within(-0.1, 0.1) as f32));
+    for points in [uniform.collect(), noisy(sphere, 1500, 0.05, 1)] {
+        assert_eq!(finished(points).step().unwrap().warnings, []);
+    }
+}
+
+/// Points scattered around an object get parts of their own, which a warning says. Where points are sparser there is none.
+#[test]
+fn scattered_points_that_the_surface_follows_give_a_warning() {
+    let mut random = Random(5);
+    let scattered = (0..30).map(|_| Vec3::from([0; 3].map(|_| random.within(-4.0, 4.0) as f32)));
+    let points: Vec<Vec3> = noisy(sphere, 800, 0.0, 1).into_iter().chain(scattered).collect();
+    let mut surface = finished(points.clone());
+    assert!(euler_of_parts(surface.surface()).len() > 1);
+    let found = surface.step().unwrap().warnings.into_iter().find(|one| one.code == WarningCode::Outliers);
+    let Some(Warning { place: Some(Place::Point(p)), .. }) = found else { panic!("{found:?}") };
+    assert!((DVec3::from(p).length() - 1.0).abs() > 0.2, "{p:?}");
+    let mut cleaned = ImplicitSurface::new(
+        Cloud { points, ..Cloud::default() },
+        ImplicitOptions { keep_components: Some(1), ..ImplicitOptions::default() },
+    );
+    let cleaned = cleaned.as_mut().unwrap();
+    while !cleaned.step().unwrap().done {}
+    assert!(cleaned.step().unwrap().warnings.iter().all(|one| one.code != WarningCode::Outliers));
+    // Every tenth point of a half.
+    let uneven = noisy(sphere, 1500, 0.0, 1).into_iter().enumerate();
+    let uneven = uneven.filter(|(i, p)| p.z > 0.0 || i % 10 == 0).map(|(_, p)| p).collect();
+    let warnings = finished(uneven).step().unwrap().warnings;
+    assert!(warnings.iter().all(|one| one.code != WarningCode::Outliers), "{warnings:?}");
+}
+
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn parts_as_thin_as_the_noise_give_a_warning() {

@@ -37,6 +37,7 @@ mod automatic;
 mod camera;
 mod cloud;
 mod color;
+mod doubts;
 mod edits;
 mod exterior;
 mod extract;
@@ -70,11 +71,11 @@ use crate::math::{DAffine3, DVec3, PositionIndex, Vec3};
 use crate::mesh::{TriangleMesh, measure as measure_mesh};
 use crate::pauses::{Computation, Pauses, advance, finished};
 use crate::remesh::Changes;
-use crate::spatial::PointGrid;
 use crate::warning::{Place, Warning, WarningCode};
 use automatic::OffSurfaceSearch;
 use cloud::{BoxMap, MAX_POINTS, MIN_POINTS};
 use color::Coloring;
+use doubts::{Doubts, Fit, Scattered};
 use exterior::{AGREEMENT, Exterior, exterior_from_points, generate_exterior};
 use extract::{Extraction, default_cell};
 use field::Field;
@@ -133,17 +134,15 @@ const KEPT_BYTES: usize = 256 << 20;
 /// Rounding of the points, in their mean distance to the nearest neighbour, above which there is a warning.
 const COARSE_SHARE: f64 = 0.1;
 
-/// Distance of a point from the surface, in the distance between points and three times their noise, at which the surface does
-/// not follow it. Of the two furthest points near each other it is .5 at most on twelve shapes with 60 to 3,000 points and noise
-/// of 0 to .02 whose topology is right, and .8 to 2.5 where parts of two points and more are lost.
-const FAR: f64 = 0.7;
-
 const AMBIGUOUS: &str = "inside and outside are ambiguous: walls or gaps are about as thin as the spacing of the points or \
                          their noise; components, handles and volume may be wrong";
 const UNCLEAR: &str = "inside and outside are hardly distinguished here: a wall or gap is about as thin as the spacing of the \
                        points or their noise, and may be bridged or broken; components, handles and volume may be wrong";
 const UNREACHED: &str = "the surface is far from several points here: a part of the object, or a gap, that has so few points is lost, or \
                          they are outliers; give more points or normals here, or remove them";
+const BETWEEN_SHEETS: &str = "the surface runs between two sheets of points here, as if they were one with noise: a wall or gap that is about as thin \
+                              as the points are apart, or registered twice, is lost; components, handles and volume may be wrong; \
+                              measure more points, or give lambdaSurface";
 const INWARD: &str =
     "the normals that were given point inwards on the whole: inside and outside are exchanged; reverse them";
 const COARSE: &str = "the points are rounded to single precision, which is coarse beside their spacing so far from the origin: \
@@ -190,8 +189,8 @@ pub struct ImplicitSurface {
     solver: Option<Box<Solver>>,
     /// Where the last finished surface separates inside and outside least clearly, if hardly.
     unclear: Option<Vec3>,
-    /// One of several points that the surface is far from.
-    unreached: Option<Vec3>,
+    /// Doubts about the last finished surface.
+    doubts: Doubts,
     mesh: TriangleMesh,
     /// Counter of changes of the surface or its colours, so that callers know when to draw it again.
     version: u32,
@@ -350,7 +349,7 @@ impl ImplicitSurface {
             unedited: None,
             solver: None,
             unclear: None,
-            unreached: None,
+            doubts: Doubts::default(),
             mesh: TriangleMesh::default(),
             version: 0,
             components: 0,
@@ -441,44 +440,55 @@ impl ImplicitSurface {
             (is_coarse, WarningCode::Precision, COARSE),
         ];
         let found = found.into_iter().filter(|one| one.0).map(|(_, code, text)| Warning::new(code, text));
-        found.chain(self.thin_parts()).collect()
+        // The points that are so far away are among the scattered ones.
+        let scattered = self.scattered_points().filter(|_| !self.has_far_outliers());
+        found.chain(scattered).chain(self.thin_parts()).collect()
     }
 
     fn thin_parts(&self) -> Option<Warning> {
         if self.ambiguous_sides && self.params.sides != Sides::Outside {
             return Some(Warning::new(WarningCode::ThinParts, AMBIGUOUS));
         }
-        let found = self.unclear.map(|p| (p, UNCLEAR)).or(self.unreached.map(|p| (p, UNREACHED)));
-        let (point, text) = found?;
-        let place = Place::Point((point.as_dvec3() + self.origin).to_array());
-        Some(Warning::at(WarningCode::ThinParts, place, text))
+        let Doubts { unreached, between_sheets, .. } = self.doubts;
+        let found = [(between_sheets, BETWEEN_SHEETS), (self.unclear, UNCLEAR), (unreached, UNREACHED)];
+        let (point, text) = found.into_iter().find_map(|(point, text)| Some((point?, text)))?;
+        Some(Warning::at(WarningCode::ThinParts, self.place(point), text))
     }
 
-    /// Returns a point that a surface is far from, if another such point is near it: far beside their distance from each other
-    /// and their noise.
-    fn unreached_by(&self, mesh: &TriangleMesh) -> Option<Vec3> {
+    /// Returns a point relative to the origin as the place of a warning.
+    fn place(&self, point: Vec3) -> Place {
+        Place::Point((point.as_dvec3() + self.origin).to_array())
+    }
+
+    /// Returns the warning about points far from all others that the surface follows.
+    fn scattered_points(&self) -> Option<Warning> {
+        let Scattered { count, point } = self.doubts.scattered?;
+        let many = if count == 1 { "a point is".to_string() } else { format!("{count} points are") };
+        let text = format!(
+            "{many} far from all others, and the surface follows: it may have parts, bulges or a volume that the object has \
+             not; keep only the largest cluster of points (keepComponents: 1), or remove the points, of which one is here"
+        );
+        Some(Warning::at(WarningCode::Outliers, self.place(point), text))
+    }
+
+    /// Returns the doubts about a finished surface.
+    fn doubts_of(&self, mesh: &TriangleMesh) -> Doubts {
         let Choice { density, noise, .. } = self.in_force();
         let scale = self.map.scale();
-        let apart = 1.0 / density.sqrt() / scale;
-        let far = (FAR * (apart + 3.0 * noise / scale)).max(self.cell()) as f32;
+        let points = self.map.all_in_world(&self.constraints.centres[..self.constraints.surface]);
+        let fit = Fit {
+            mesh,
+            points: &points,
+            apart: 1.0 / density.sqrt() / scale,
+            noise: noise / scale,
+            cell: self.cell(),
+        };
+        let scattered = fit.scattered();
         // With a λ that was given, a surface is as far from the points as λ says.
-        let is_chosen = self.params.lambda_surface.given().is_none();
-        if !is_chosen || mesh.positions.is_empty() || !far.is_finite() {
-            return None;
+        if self.params.lambda_surface.given().is_some() {
+            return Doubts { scattered, ..Doubts::default() };
         }
-        let surface = PointGrid::of(&mesh.positions, far);
-        let mut points = self.map.all_in_world(&self.constraints.centres[..self.constraints.surface]);
-        points.retain(|&p| !surface.has_within(p, far));
-        let near = 2.0 * apart as f32;
-        let unreached = PointGrid::of(&points, near);
-        points.iter().copied().find(|&p| {
-            let mut count = 0;
-            unreached.within(p, near, |_, _| {
-                count += 1;
-                count < 2
-            });
-            count == 2
-        })
+        Doubts { unreached: fit.unreached(), between_sheets: fit.between_sheets(), scattered }
     }
 
     fn has_far_outliers(&self) -> bool {
@@ -781,7 +791,7 @@ impl ImplicitSurface {
     }
 
     fn take_mesh(&mut self, mesh: TriangleMesh) {
-        self.unreached = self.unreached_by(&mesh);
+        self.doubts = self.doubts_of(&mesh);
         let measures = measure_mesh(&mesh);
         (self.components, self.euler) = (measures.components as u32, measures.euler);
         self.mesh = TriangleMesh { origin: self.origin, ..mesh };
