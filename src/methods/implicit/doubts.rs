@@ -117,10 +117,11 @@ impl Fit<'_> {
         // Finer than its radius: it has many more vertices.
         let surface = PointGrid::of(&self.mesh.positions, far / 4.0);
         let is_scattered =
-            |&&p: &&Vec3| !has_neighbours(&points, p, far, 2) && surface.has_within(p, far / 2.0);
-        let mut scattered = self.points.iter().filter(is_scattered);
-        let point = *scattered.next()?;
-        Some(Scattered { count: 1 + scattered.count(), point })
+            |&p: &Vec3| !has_neighbours(&points, p, far, 2) && surface.has_within(p, far / 2.0);
+        let scattered: Vec<Vec3> = self.points.iter().copied().filter(is_scattered).collect();
+        // Where points get sparser by and by, the next is about as far from others.
+        let point = scattered.iter().copied().find(|&p| stands_out(&points, p))?;
+        Some(Scattered { count: scattered.len(), point })
     }
 
     /// Returns the median distance of a point from the second nearest one.
