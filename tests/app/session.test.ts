@@ -178,6 +178,8 @@ test('a session with its data opens anywhere, and one that cannot be read change
   const file = await session(page);
   const before = await surface(page);
   await elsewhere('extract?example=linked-rings&v=2', async (other) => {
+    // During a run, it would go on, in the same state.
+    await reach(other, 'done');
     await afterRun(other, () => setRigidity(other, '0.4'));
     const own = await surface(other);
     await drop(other, asFile(file.slice(0, -100)));

@@ -132,9 +132,10 @@ export class ExtractData implements LabData<Example, Linked, ImageSource, Opened
     const { volume, choice, params, setup, moments, labels = 0 } = opened;
     this.#states.ready = true;
     this.#ui.adopt(volume, source, labels);
+    this.#settings.adopt(volume, choice, params, setup);
+    // The address, which is written then, has the settings.
     if (source.linked && !source.isChange)
       this.#ui.options.set({ ...initialOptions(EXTRACT_VIEW), ...source.linked.view });
-    this.#settings.adopt(volume, choice, params, setup);
     if (moments)
       return this.#resume(moments, source.session && contentOf<ExtractContent>(source.session, 'extract').view);
     this.#settings.checkpoint(text('labs.play'));
