@@ -37,7 +37,6 @@ mod automatic;
 mod camera;
 mod cloud;
 mod color;
-mod doubts;
 mod edits;
 mod exterior;
 mod extract;
@@ -54,6 +53,7 @@ mod sampling;
 mod sides_trial;
 mod solve;
 mod state;
+mod warnings;
 
 pub use automatic::Choice;
 pub use camera::Camera;
@@ -75,7 +75,6 @@ use crate::warning::{Place, Warning, WarningCode};
 use automatic::OffSurfaceSearch;
 use cloud::{BoxMap, MAX_POINTS, MIN_POINTS};
 use color::Coloring;
-use doubts::{Doubts, Fit, Scattered};
 use exterior::{AGREEMENT, Exterior, exterior_from_points, generate_exterior};
 use extract::{Extraction, default_cell};
 use field::Field;
@@ -87,6 +86,7 @@ use sides_trial::SidesTrial;
 use solve::{Constraints, Solution, Solver};
 use std::future::ready;
 use std::task::Poll;
+use warnings::{Findings, Fit, Scattered};
 
 /// Options of an [`ImplicitSurface`], given to [`ImplicitSurface::new`] together with its points.
 #[derive(Clone, Debug)]
@@ -140,7 +140,7 @@ const UNCLEAR: &str = "inside and outside are hardly distinguished here: a wall 
                        points or their noise, and may be bridged or broken; components, handles and volume may be wrong";
 const UNREACHED: &str = "the surface is far from several points here: a part of the object, or a gap, that has so few points is lost, or \
                          they are outliers; give more points or normals here, or remove them";
-const BETWEEN_SHEETS: &str = "the surface runs between two sheets of points here, as if they were one with noise: a wall or gap that is about as thin \
+const BETWEEN_SHEETS: &str = "the surface lies between two sheets of points here, as if they were one with noise: a wall or gap that is about as thin \
                               as the points are apart, or registered twice, is lost; components, handles and volume may be wrong; \
                               measure more points, or give lambdaSurface";
 const INWARD: &str =
@@ -189,8 +189,8 @@ pub struct ImplicitSurface {
     solver: Option<Box<Solver>>,
     /// Where the last finished surface separates inside and outside least clearly, if hardly.
     unclear: Option<Vec3>,
-    /// Doubts about the last finished surface.
-    doubts: Doubts,
+    /// Findings about the last finished surface, for warnings.
+    findings: Findings,
     mesh: TriangleMesh,
     /// Counter of changes of the surface or its colours, so that callers know when to draw it again.
     version: u32,
@@ -349,7 +349,7 @@ impl ImplicitSurface {
             unedited: None,
             solver: None,
             unclear: None,
-            doubts: Doubts::default(),
+            findings: Findings::default(),
             mesh: TriangleMesh::default(),
             version: 0,
             components: 0,
@@ -449,7 +449,7 @@ impl ImplicitSurface {
         if self.ambiguous_sides && self.params.sides != Sides::Outside {
             return Some(Warning::new(WarningCode::ThinParts, AMBIGUOUS));
         }
-        let Doubts { unreached, between_sheets, .. } = self.doubts;
+        let Findings { unreached, between_sheets, .. } = self.findings;
         let found = [(between_sheets, BETWEEN_SHEETS), (self.unclear, UNCLEAR), (unreached, UNREACHED)];
         let (point, text) = found.into_iter().find_map(|(point, text)| Some((point?, text)))?;
         Some(Warning::at(WarningCode::ThinParts, self.place(point), text))
@@ -462,7 +462,7 @@ impl ImplicitSurface {
 
     /// Returns the warning about points far from all others that the surface follows.
     fn scattered_points(&self) -> Option<Warning> {
-        let Scattered { count, point } = self.doubts.scattered?;
+        let Scattered { count, point } = self.findings.scattered?;
         let many = if count == 1 { "a point is".to_string() } else { format!("{count} points are") };
         let text = format!(
             "{many} far from all others, and the surface follows: it may have parts, bulges or a volume that the object has \
@@ -471,8 +471,8 @@ impl ImplicitSurface {
         Some(Warning::at(WarningCode::Outliers, self.place(point), text))
     }
 
-    /// Returns the doubts about a finished surface.
-    fn doubts_of(&self, mesh: &TriangleMesh) -> Doubts {
+    /// Returns findings about a finished surface.
+    fn findings_of(&self, mesh: &TriangleMesh) -> Findings {
         let Choice { density, noise, .. } = self.in_force();
         let scale = self.map.scale();
         let points = self.map.all_in_world(&self.constraints.centres[..self.constraints.surface]);
@@ -486,9 +486,9 @@ impl ImplicitSurface {
         let scattered = fit.scattered();
         // With a λ that was given, a surface is as far from the points as λ says.
         if self.params.lambda_surface.given().is_some() {
-            return Doubts { scattered, ..Doubts::default() };
+            return Findings { scattered, ..Findings::default() };
         }
-        Doubts { unreached: fit.unreached(), between_sheets: fit.between_sheets(), scattered }
+        Findings { unreached: fit.unreached(), between_sheets: fit.between_sheets(), scattered }
     }
 
     fn has_far_outliers(&self) -> bool {
@@ -791,7 +791,7 @@ impl ImplicitSurface {
     }
 
     fn take_mesh(&mut self, mesh: TriangleMesh) {
-        self.doubts = self.doubts_of(&mesh);
+        self.findings = self.findings_of(&mesh);
         let measures = measure_mesh(&mesh);
         (self.components, self.euler) = (measures.components as u32, measures.euler);
         self.mesh = TriangleMesh { origin: self.origin, ..mesh };

@@ -137,7 +137,7 @@ export function linkFormat<Fields extends Record<string, Field<unknown>>, View e
     fromHash(hash) {
       const query = queryOf(hash, address);
       if (!query) return undefined;
-      const [values, unread]: [Record<string, unknown>, string[]] = [{}, []];
+      const [values, view, unread]: [Record<string, unknown>, Record<string, unknown>, string[]] = [{}, {}, []];
       const read = (key: string, field: Field<unknown>, text: string) => {
         const value = field.read(text);
         if (value === undefined) unread.push(`${key}=${text}`.slice(0, MOST_NAME));
@@ -151,14 +151,12 @@ export function linkFormat<Fields extends Record<string, Field<unknown>>, View e
           if (list.length > 0) values[key] = list;
         } else {
           const value = read(key, field, query.get(key) ?? '');
-          if (value !== undefined) values[key] = value;
+          if (value !== undefined) (Object.hasOwn(options, key) ? view : values)[key] = value;
         }
       }
       for (const [key, text] of query)
         if (!known.has(key) && key !== VERSION && !key.startsWith('p.'))
           unread.push(`${key}=${text}`.slice(0, MOST_NAME));
-      const view = among(values, Object.keys(options));
-      for (const name of Object.keys(options)) delete values[name];
       const params = paramsIn(query, readParam);
       return { ...values, params, view, ...(unread.length > 0 && { unread }) } as Linked<Fields, View>;
     },

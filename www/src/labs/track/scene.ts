@@ -20,9 +20,6 @@ import { RegionGrips, regionEdges } from './region';
 import type { TrackViewOptions } from './view';
 import { drawFaces, drawVotes, voteColors, votesNear } from './votes';
 
-/** Content below the Track lab's 3D view: the slices, or one of the paper's figures. */
-export type ContentBelow = 'slices' | 'boundary' | 'time' | 'between';
-
 /** Diameter of the disc that marks a boundary vote, as a fraction of the voxel's shortest side. */
 const DISC = 1.1;
 /** Distance from a vertex of the surface within which boundary votes count as near it, in shortest voxel sides. */

@@ -8,6 +8,7 @@ const VOTES = oneOf(
   'none',
 );
 
+/** Content below the 3D view: the slices, or one of the paper's figures. */
 const BELOW = oneOf(
   'trackPanels.below',
   {

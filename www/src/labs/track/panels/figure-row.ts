@@ -14,7 +14,7 @@ import {
   voxelIn,
 } from '../figure-images';
 import type { BoundaryVotes, InterpolatedSlice } from '../protocol';
-import type { ContentBelow } from '../scene';
+import type { TrackViewOptions } from '../view';
 
 /**
  * Default settings of Canny's edge detector for greys of 0 to 255; for its image, the paper used a deviation of 1.5,
@@ -54,7 +54,7 @@ export interface FigureData {
 /** Row of images like one of the paper's figures, shown below the Track lab's 3D view in place of the slices. */
 export class FigureRow {
   readonly element: HTMLElement;
-  readonly #rows: Record<Exclude<ContentBelow, 'slices'>, HTMLElement>;
+  readonly #rows: Record<Exclude<TrackViewOptions['below'], 'slices'>, HTMLElement>;
   readonly #clusters = new FigureImage(text('trackPanels.clusteredLabel'));
   readonly #boundary = new FigureImage(text('trackPanels.votesLabel'));
   readonly #canny = new FigureImage(text('trackPanels.cannyLabel'));
@@ -67,7 +67,7 @@ export class FigureRow {
     text('trackPanels.sliceAfter'),
   ].map((label) => new FigureImage(label));
   readonly #settings = { ...CANNY };
-  #below: ContentBelow = 'slices';
+  #below: TrackViewOptions['below'] = 'slices';
   #data: FigureData | undefined;
 
   /**
@@ -98,7 +98,7 @@ export class FigureRow {
     });
   }
 
-  set below(below: ContentBelow) {
+  set below(below: TrackViewOptions['below']) {
     this.#below = below;
     this.element.hidden = below === 'slices';
     for (const [name, row] of Object.entries(this.#rows)) row.hidden = name !== below;

@@ -1,5 +1,5 @@
-//! Doubts about a finished surface, from its distances to its points: points that it is far from, two sheets that it runs between,
-//! and scattered points that it follows.
+//! Checks of a finished surface against its points, for warnings: points that it is far from, two sheets of points that it lies between,
+//! and outliers that it follows.
 
 use crate::math::order::median;
 use crate::math::{IVec3, Vec3};
@@ -20,9 +20,10 @@ const ENOUGH: usize = 60;
 /// and one in 150 of 200; 3 for normal noise. On 99 clouds of one sheet, with 100 to 1,200 points and noise of either kind, none
 /// is below 1.8.
 const TWO_VALUED: f64 = 1.65;
-/// Share of the cells, as its inverse, with two sheets from which there is a doubt, and the least standard deviation of distances, in
-/// the distance between points: of exact points it is less, and has the pattern of the cells of extraction.
+/// Inverse of the share of cells with two sheets from which there is a warning.
 const SHARE: usize = 16;
+/// Least standard deviation of the distances of two sheets, in the distance between points: that of exact points is less, and has
+/// the pattern of the cells of extraction.
 const LEAST_DEVIATION: f64 = 0.2;
 /// Largest number of points whose distances are evaluated, and of those from which the median spacing is estimated.
 const MOST: usize = 10_000;
@@ -50,12 +51,12 @@ pub struct Scattered {
     pub point: Vec3,
 }
 
-/// Findings about a surface.
+/// Findings about a surface, for warnings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Doubts {
+pub struct Findings {
     /// One of several points that the surface is far from.
     pub unreached: Option<Vec3>,
-    /// A point where the surface runs between two sheets of points.
+    /// A point where the surface lies between two sheets of points.
     pub between_sheets: Option<Vec3>,
     pub scattered: Option<Scattered>,
 }
@@ -76,7 +77,7 @@ impl Fit<'_> {
         points.iter().copied().find(|&p| has_neighbours(&unreached, p, near, 1))
     }
 
-    /// Returns a point where the surface runs between two sheets of points, or on one of them with the other beside it: its
+    /// Returns a point where the surface lies between two sheets of points, or on one of them with the other beside it: its
     /// distances from the points there have two values, as noise has not.
     pub fn between_sheets(&self) -> Option<Vec3> {
         let normals = self.mesh.normals.as_ref()?;
@@ -88,9 +89,12 @@ impl Fit<'_> {
         let step = self.points.len().div_ceil(MOST).max(1);
         let mut cells: BTreeMap<[i32; 3], Vec<(f64, Vec3)>> = BTreeMap::new();
         for &p in self.points.iter().step_by(step) {
-            let Some(nearest) = nearest_within(&surface, p, reach) else { continue };
-            let offset = p.as_dvec3() - self.mesh.positions[nearest].as_dvec3();
-            let distance = offset.dot(normals[nearest].as_dvec3());
+            let Some(&(squared, nearest)) = surface.nearest(p, 1, reach).first() else { continue };
+            if squared > reach * reach {
+                continue;
+            }
+            let offset = p.as_dvec3() - self.mesh.positions[nearest as usize].as_dvec3();
+            let distance = offset.dot(normals[nearest as usize].as_dvec3());
             let cell: IVec3 = (p / (SIDE * self.apart as f32 * (step as f32).sqrt())).floor().as_ivec3();
             cells.entry(cell.to_array()).or_default().push((distance, p));
         }
@@ -100,9 +104,9 @@ impl Fit<'_> {
         }
         let cells: Vec<_> = cells.into_values().filter(|cell| cell.len() >= ENOUGH).collect();
         let least = LEAST_DEVIATION * self.apart;
-        let mut doubtful = cells.iter().filter(|cell| are_two_valued(cell, least)).peekable();
-        let (_, first) = *doubtful.peek()?.first()?;
-        (SHARE * doubtful.count() >= cells.len()).then_some(first)
+        let mut with_two = cells.iter().filter(|cell| are_two_valued(cell, least)).peekable();
+        let (_, first) = *with_two.peek()?.first()?;
+        (SHARE * with_two.count() >= cells.len()).then_some(first)
     }
 
     /// Returns the points that the surface follows though they are far from all but one other, if there are any: outliers.
@@ -148,18 +152,6 @@ fn stands_out(points: &PointGrid, p: Vec3) -> bool {
     let nearest = points.nearest(p, 2, points.cell());
     let Some(&(squared, i)) = nearest.last() else { return false };
     has_neighbours(points, points.points()[i as usize], squared.sqrt() / 4.0, 2)
-}
-
-/// Returns the index of the point nearest to `p`, if it is within a radius.
-fn nearest_within(grid: &PointGrid, p: Vec3, radius: f32) -> Option<usize> {
-    let mut nearest: Option<(f32, u32)> = None;
-    grid.within(p, radius, |i, squared| {
-        if nearest.is_none_or(|best| (squared, i) < best) {
-            nearest = Some((squared, i));
-        }
-        true
-    });
-    nearest.map(|(_, i)| i as usize)
 }
 
 /// Tests whether distances are of two values, and their standard deviation is at least `least`.
