@@ -198,21 +198,27 @@ fn a_surface_between_two_sheets_gives_a_warning() {
 /// Points scattered around an object get parts of their own, which a warning says. Where points are sparser there is none.
 #[test]
 fn scattered_points_that_the_surface_follows_give_a_warning() {
-    let mut random = Random(5);
-    let scattered = (0..30).map(|_| Vec3::from([0; 3].map(|_| random.within(-4.0, 4.0) as f32)));
-    let points: Vec<Vec3> = noisy(sphere, 800, 0.0, 1).into_iter().chain(scattered).collect();
-    let mut surface = finished(points.clone());
-    assert!(euler_of_parts(surface.surface()).len() > 1);
-    let found = surface.step().unwrap().warnings.into_iter().find(|one| one.code == WarningCode::Outliers);
-    let Some(Warning { place: Some(Place::Point(p)), .. }) = found else { panic!("{found:?}") };
-    assert!((DVec3::from(p).length() - 1.0).abs() > 0.2, "{p:?}");
-    let mut cleaned = ImplicitSurface::new(
-        Cloud { points, ..Cloud::default() },
-        ImplicitOptions { keep_components: Some(1), ..ImplicitOptions::default() },
-    );
-    let cleaned = cleaned.as_mut().unwrap();
-    while !cleaned.step().unwrap().done {}
-    assert!(cleaned.step().unwrap().warnings.iter().all(|one| one.code != WarningCode::Outliers));
+    for seed in 1..=6 {
+        let mut random = Random(seed);
+        let scattered = (0..30).map(|_| Vec3::from([0; 3].map(|_| random.within(-4.0, 4.0) as f32)));
+        let points: Vec<Vec3> = noisy(sphere, 800, 0.0, seed).into_iter().chain(scattered).collect();
+        let mut surface = finished(points.clone());
+        assert!(euler_of_parts(surface.surface()).len() > 1);
+        let found =
+            surface.step().unwrap().warnings.into_iter().find(|one| one.code == WarningCode::Outliers);
+        let Some(Warning { place: Some(Place::Point(p)), .. }) = found else { panic!("{seed}: {found:?}") };
+        assert!((DVec3::from(p).length() - 1.0).abs() > 0.2, "{p:?}");
+        if seed > 1 {
+            continue;
+        }
+        let mut cleaned = ImplicitSurface::new(
+            Cloud { points, ..Cloud::default() },
+            ImplicitOptions { keep_components: Some(1), ..ImplicitOptions::default() },
+        );
+        let cleaned = cleaned.as_mut().unwrap();
+        while !cleaned.step().unwrap().done {}
+        assert!(cleaned.step().unwrap().warnings.iter().all(|one| one.code != WarningCode::Outliers));
+    }
     // Every tenth point of a half.
     let uneven = noisy(sphere, 1500, 0.0, 1).into_iter().enumerate();
     let uneven = uneven.filter(|(i, p)| p.z > 0.0 || i % 10 == 0).map(|(_, p)| p).collect();

@@ -120,12 +120,15 @@ impl Fit<'_> {
         let points = PointGrid::of(self.points, far);
         // Finer than its radius: it has many more vertices.
         let surface = PointGrid::of(&self.mesh.positions, far / 4.0);
-        let is_scattered =
-            |&p: &Vec3| !has_neighbours(&points, p, far, 2) && surface.has_within(p, far / 2.0);
-        let scattered: Vec<Vec3> = self.points.iter().copied().filter(is_scattered).collect();
-        // Where points get sparser by and by, the next is about as far from others.
-        let point = scattered.iter().copied().find(|&p| stands_out(&points, p))?;
-        Some(Scattered { count: scattered.len(), point })
+        let (others, mut followed): (Vec<Vec3>, Vec<Vec3>) =
+            self.points.iter().partition(|&&p| has_neighbours(&points, p, far, 2));
+        // Where points get sparser by and by, those beside them are about as far from each other.
+        let others = PointGrid::of(&others, far);
+        if !followed.iter().any(|&p| stands_out(p, &others)) {
+            return None;
+        }
+        followed.retain(|&p| surface.has_within(p, far / 2.0));
+        Some(Scattered { count: followed.len(), point: *followed.first()? })
     }
 
     /// Returns the median distance of a point from the second nearest one.
@@ -147,11 +150,11 @@ fn has_neighbours(grid: &PointGrid, p: Vec3, radius: f32, count: usize) -> bool 
     found > count
 }
 
-/// Tests whether the nearest other point to `p` has others at less than a quarter of the distance.
-fn stands_out(points: &PointGrid, p: Vec3) -> bool {
-    let nearest = points.nearest(p, 2, points.cell());
-    let Some(&(squared, i)) = nearest.last() else { return false };
-    has_neighbours(points, points.points()[i as usize], squared.sqrt() / 4.0, 2)
+/// Tests whether the nearest of the other points to `p` has two more at less than a quarter of the distance.
+fn stands_out(p: Vec3, others: &PointGrid) -> bool {
+    let nearest = others.nearest(p, 1, others.cell());
+    let Some(&(squared, i)) = nearest.first() else { return false };
+    has_neighbours(others, others.points()[i as usize], squared.sqrt() / 4.0, 2)
 }
 
 /// Tests whether distances are of two values, and their standard deviation is at least `least`.
