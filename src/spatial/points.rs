@@ -63,6 +63,10 @@ impl PointGrid {
     /// The order is unspecified but deterministic.
     pub fn within(&self, p: Vec3, radius: f32, mut visit: impl FnMut(u32, f32) -> bool) {
         let [low, high] = [-radius, radius].map(|reach| self.cell_of(p + Vec3::splat(reach)));
+        if self.is_faster_to_visit_all(low, high) {
+            self.visit_all(p, radius * radius, &mut visit);
+            return;
+        }
         for z in low[2]..=high[2] {
             for y in low[1]..=high[1] {
                 for x in low[0]..=high[0] {
@@ -117,6 +121,21 @@ impl PointGrid {
         }
         sort_pairs(&mut ranked);
         ranked.into_iter().map(|(squared, i)| (f32::from_bits(squared as u32), i)).collect()
+    }
+
+    /// Whether a box has many more cells than there are points.
+    fn is_faster_to_visit_all(&self, low: [i32; 3], high: [i32; 3]) -> bool {
+        let across = |axis: usize| f64::from(high[axis]) - f64::from(low[axis]) + 1.0;
+        across(0) * across(1) * across(2) > 8.0 * (self.points.len() + 27) as f64
+    }
+
+    fn visit_all(&self, p: Vec3, most: f32, visit: &mut impl FnMut(u32, f32) -> bool) {
+        for (q, i) in self.points.iter().zip(0..) {
+            let squared = q.distance_squared(p);
+            if squared <= most && !visit(i, squared) {
+                return;
+            }
+        }
     }
 
     fn visit_cell(
@@ -175,7 +194,8 @@ mod tests {
             let grid = PointGrid::of(&all, cell);
             assert_eq!(grid.points(), all);
             for &p in all.iter().step_by(7) {
-                for radius in [0.0, 1e-5, 0.1, 0.6] {
+                // The last ones are in more cells than could be visited.
+                for radius in [0.0, 1e-5, 0.1, 0.6, 1e4, 1e30] {
                     let mut found = Vec::new();
                     grid.within(p, radius, |i, squared| {
                         assert_eq!(squared, all[i as usize].distance_squared(p));

@@ -639,8 +639,11 @@ fn near_outliers_that_are_discarded_do_not_change_the_box() {
 
 #[test]
 fn far_outliers_that_are_kept_give_a_warning() {
-    for (distance, expected) in [(1e3, true), (50.0, true), (3.0, false)] {
-        let points = [noisy(sphere, 600, 0.0, 1), vec![Vec3::X * distance]].concat();
+    for (distance, expected) in [(1e6, true), (1e3, true), (50.0, true), (3.0, false)] {
+        let far = [Vec3::X * distance, Vec3::Y * distance];
+        // Two of the near ones would be a part.
+        let far = &far[..if expected { 2 } else { 1 }];
+        let points = [&noisy(sphere, 600, 0.0, 1), far].concat();
         let mut surface = begun(points, ImplicitParams::paper());
         let codes: Vec<_> = finish(&mut surface).warnings.iter().map(|warning| warning.code).collect();
         assert_eq!(codes, if expected { vec![WarningCode::Outliers] } else { vec![] }, "{distance}");

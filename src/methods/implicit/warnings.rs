@@ -89,10 +89,7 @@ impl Fit<'_> {
         let step = self.points.len().div_ceil(MOST).max(1);
         let mut cells: BTreeMap<[i32; 3], Vec<(f64, Vec3)>> = BTreeMap::new();
         for &p in self.points.iter().step_by(step) {
-            let Some(&(squared, nearest)) = surface.nearest(p, 1, reach).first() else { continue };
-            if squared > reach * reach {
-                continue;
-            }
+            let Some(nearest) = nearest_within(&surface, p, reach) else { continue };
             let offset = p.as_dvec3() - self.mesh.positions[nearest as usize].as_dvec3();
             let distance = offset.dot(normals[nearest as usize].as_dvec3());
             let cell: IVec3 = (p / (SIDE * self.apart as f32 * (step as f32).sqrt())).floor().as_ivec3();
@@ -150,11 +147,25 @@ fn has_neighbours(grid: &PointGrid, p: Vec3, radius: f32, count: usize) -> bool 
     found > count
 }
 
+/// Returns the index of the nearest point to `p` within a radius, of several the first.
+fn nearest_within(grid: &PointGrid, p: Vec3, radius: f32) -> Option<u32> {
+    let mut nearest: Option<(f32, u32)> = None;
+    grid.within(p, radius, |i, squared| {
+        if nearest.is_none_or(|least| (squared, i) < least) {
+            nearest = Some((squared, i));
+        }
+        true
+    });
+    nearest.map(|(_, i)| i)
+}
+
 /// Tests whether the nearest of the other points to `p` has two more at less than a quarter of the distance.
 fn stands_out(p: Vec3, others: &PointGrid) -> bool {
     let nearest = others.nearest(p, 1, others.cell());
     let Some(&(squared, i)) = nearest.first() else { return false };
-    has_neighbours(others, others.points()[i as usize], squared.sqrt() / 4.0, 2)
+    // Not the points within that distance, which is as large as the outlier is far: they are in any number of cells.
+    let about = others.nearest(others.points()[i as usize], 3, others.cell());
+    about.get(2).is_some_and(|&(third, _)| 16.0 * third < squared)
 }
 
 /// Tests whether distances are of two values, and their standard deviation is at least `least`.
