@@ -4,7 +4,8 @@
  *
  * @packageDocumentation
  */
-import { VesicleCrash, VesicleError } from './error.js';
+import { type RequestContext, serve, withTransfer } from './channel.js';
+import { VesicleError } from './error.js';
 import init, {
   animationGlb,
   DeformableModel,
@@ -21,24 +22,22 @@ import init, {
 import type { MeshArrays, PositionOptions } from './mesh.js';
 import {
   ABORTABLE,
-  type Failure,
+  type Call,
+  type Free,
   FUNCTIONS,
   isReference,
   lookUp,
   MEMBERS,
   mapObjects,
   type Reference,
-  type Reply,
   type Report,
-  type Request,
+  type Requests,
   SLICED,
   STATICS,
-  type Task,
 } from './worker-protocol.js';
 import type { ClassName, FunctionName, Library, LibraryObject } from './worker-types.js';
 
-type Post = (reply: Reply, transfer: ArrayBuffer[]) => void;
-type Call = Extract<Task, { type: 'call' }>;
+type Context = RequestContext<Report>;
 type Entry = { object: LibraryObject } | { failed: unknown };
 
 const LIBRARY: Pick<Library, ClassName | FunctionName> = {
@@ -49,49 +48,24 @@ const LIBRARY: Pick<Library, ClassName | FunctionName> = {
 const CLASSES = Object.keys(MEMBERS) as ClassName[];
 
 /**
- * Reason with which the worker aborts tasks on request of the page. The page does not send its own reason, and rejects
- * with that.
- */
-const ABORTED = new VesicleError('aborted', 'the run was aborted');
-
-/**
  * The worker's side of the connection: handles the page's requests in order, also between the slices of a run in
  * progress.
  */
 class Host {
-  readonly #post: Post;
   readonly #objects = new Map<number, Entry>();
-  readonly #controllers = new Map<number, AbortController>();
   #last = 0;
 
-  constructor(post: Post) {
-    this.#post = post;
+  async call(call: Call, context: Context): Promise<unknown> {
+    return this.#outgoing(await this.#perform(call, context));
   }
 
-  receive(request: Request): void {
-    if (request.type === 'abort') this.#controllers.get(request.id)?.abort(ABORTED);
-    else if (request.type === 'free') this.#free(request.object);
-    else void this.#answer(request.id, request);
+  #perform(call: Call, context: Context): unknown {
+    if (call.slices) return this.#sliced(call, call.slices, context);
+    if (Object.hasOwn(ABORTABLE, call.name)) return this.#abortable(call, context);
+    return call.name === 'copyTo' ? this.#copyTo(call) : this.#call(call);
   }
 
-  async #answer(id: number, task: Task): Promise<void> {
-    try {
-      const [value, transfer] = this.#outgoing(await this.#perform(id, task));
-      this.#post({ type: 'value', id, value }, transfer);
-    } catch (error) {
-      this.#post({ type: 'error', id, failure: failureOf(error) }, []);
-    }
-  }
-
-  #perform(id: number, task: Task): unknown {
-    if (task.type === 'init') return start(task.module);
-    if (task.type === 'make') return this.#make(task.as, task.args);
-    if (task.slices) return this.#sliced(id, task, task.slices);
-    if (Object.hasOwn(ABORTABLE, task.name)) return this.#abortable(id, task);
-    return task.name === 'copyTo' ? this.#copyTo(task) : this.#call(task);
-  }
-
-  #make({ vesicle: at, class: name }: Reference, args: unknown[]): void {
+  make({ as: { vesicle: at, class: name }, args }: Requests['make']['body']): undefined {
     lookUp(MEMBERS, name);
     try {
       const Class = LIBRARY[name] as unknown as new (...args: unknown[]) => LibraryObject;
@@ -141,41 +115,24 @@ class Host {
     return { counts: (target as unknown as Mesh).copyTo(arrays, options), arrays };
   }
 
-  #abortable(id: number, { on, name, args, reports }: Call): Promise<unknown> {
+  #abortable({ on, name, args }: Call, { signal, report }: Context): Promise<unknown> {
     const { target } = this.#find(on, name);
     const given = this.#incoming(args);
     const options = given.pop() as object;
-    const listener = (report: Report) => this.#post({ type: 'report', id, report }, []);
-    const listeners = reports && { [ABORTABLE[name as keyof typeof ABORTABLE]]: listener };
+    const listeners = report && { [ABORTABLE[name as keyof typeof ABORTABLE]]: report };
     const work = target[name] as (...args: unknown[]) => Promise<unknown>;
-    return this.#withSignal(id, (signal) => work.call(target, ...given, { ...options, signal, ...listeners }));
+    return work.call(target, ...given, { ...options, signal, ...listeners });
   }
 
   /** Calls an operation of `inSlices`. */
-  #sliced(id: number, { on, name, args }: Call, options: object): Promise<unknown> {
+  #sliced({ on, name, args }: Call, options: object, { signal }: Context): Promise<unknown> {
     const { target } = this.#find(on, 'inSlices');
     lookUp(lookUp(SLICED, classOf(target as unknown as LibraryObject)), name);
-    const given = this.#incoming(args);
-    return this.#withSignal(id, (signal) => {
-      const operations = record(
-        (target as unknown as Mesh | Volume | ImplicitSurface).inSlices({ ...options, signal }),
-      );
-      return (operations[name] as (...args: unknown[]) => Promise<unknown>)(...given);
-    });
+    const sliced = (target as unknown as Mesh | Volume | ImplicitSurface).inSlices({ ...options, signal });
+    return (record(sliced)[name] as (...args: unknown[]) => Promise<unknown>)(...this.#incoming(args));
   }
 
-  /** Calls `work` with a signal that the page aborts by the id of its request. */
-  async #withSignal(id: number, work: (signal: AbortSignal) => Promise<unknown>): Promise<unknown> {
-    const abort = new AbortController();
-    this.#controllers.set(id, abort);
-    try {
-      return await work(abort.signal);
-    } finally {
-      this.#controllers.delete(id);
-    }
-  }
-
-  #free(at: number): void {
+  free(at: number): void {
     const entry = this.#objects.get(at);
     this.#objects.delete(at);
     if (entry && 'object' in entry) entry.object.free();
@@ -191,17 +148,17 @@ class Host {
   }
 
   /**
-   * Prepares a result for posting: objects become references, and the buffers of typed arrays are collected for
-   * transfer, which is safe because results are newly allocated.
+   * Prepares a result for posting: objects become references, and typed arrays are marked for transfer, which is safe
+   * because results are newly allocated.
    */
-  #outgoing(result: unknown): [unknown, ArrayBuffer[]] {
-    const buffers = new Set<ArrayBuffer>();
+  #outgoing(result: unknown): unknown {
+    const arrays: ArrayBufferView[] = [];
     const value = mapObjects('', result, (_, found) => {
-      if (ArrayBuffer.isView(found)) buffers.add(found.buffer as ArrayBuffer);
+      if (ArrayBuffer.isView(found)) arrays.push(found);
       if (isBinary(found)) return found;
       return CLASSES.some((name) => found instanceof LIBRARY[name]) ? this.#keep(found as LibraryObject) : undefined;
     });
-    return [value, [...buffers]];
+    return value instanceof Object ? withTransfer(value, arrays) : value;
   }
 
   #keep(object: LibraryObject): Reference {
@@ -219,36 +176,18 @@ function classOf(object: LibraryObject): ClassName {
   return CLASSES.find((name) => object instanceof LIBRARY[name]) as ClassName;
 }
 
-function start(module: Extract<Task, { type: 'init' }>['module']): Promise<void> {
+function start(module: Requests['init']['body']): Promise<undefined> {
   const source = typeof module === 'string' ? new URL(module) : module;
   return init(source && { module: source }).then(() => undefined);
 }
 
-function failureOf(error: unknown): Failure {
-  if (error === ABORTED) return { kind: 'aborted' };
-  if (error instanceof VesicleCrash) {
-    return { kind: 'crash', message: error.message, cause: error.cause ? asError(error.cause) : undefined };
-  }
-  if (error instanceof VesicleError) return { kind: 'error', code: error.code, message: error.message };
-  const other = asError(error);
-  return { kind: 'other', name: other.name, error: other };
-}
+const host = new Host();
 
-const asError = (error: unknown) => (error instanceof Error ? error : new Error(String(error)));
-
-async function inNode(): Promise<void> {
-  // Hidden from bundlers: a page never gets here.
-  const threads = 'node:worker_threads';
-  const { parentPort } = await import(/* @vite-ignore */ /* webpackIgnore: true */ threads);
-  const host = new Host((reply, transfer) => parentPort.postMessage(reply, transfer));
-  parentPort.on('message', (request: Request) => host.receive(request));
-}
-
-function inBrowser(): void {
-  const port = globalThis as unknown as { postMessage: Post };
-  const host = new Host((reply, transfer) => port.postMessage(reply, transfer));
-  addEventListener('message', ({ data }: MessageEvent<Request>) => host.receive(data));
-}
-
-if ('postMessage' in globalThis) inBrowser();
-else void inNode();
+serve<Requests, Free>(
+  {
+    init: start,
+    make: (object) => host.make(object),
+    call: (call, context) => host.call(call, context),
+  },
+  ({ free }) => host.free(free),
+);

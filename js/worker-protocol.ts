@@ -1,8 +1,9 @@
 // Messages between the page and the worker, and tables of the members that may be accessed. Nothing outside these
 // tables is ever called.
+import type { Channel } from './channel.js';
 import { VesicleError } from './error.js';
-import type { ErrorCode, ImplicitInSlices, MeshInSlices, VolumeInSlices } from './index.js';
-import type { StepReport } from './stepper.js';
+import type { ImplicitInSlices, MeshInSlices, VolumeInSlices } from './index.js';
+import type { SliceOptions, StepReport } from './stepper.js';
 import type { ClassName, FunctionName, Library } from './worker-types.js';
 
 /** A reference in a message to an object in the worker, or to one of its live meshes. */
@@ -14,31 +15,31 @@ export interface Reference {
   readonly part?: string;
 }
 
-/** A task that the page posts to the worker and that has an answer. `Request` adds its id. */
-export type Task =
-  | { type: 'init'; module: BufferSource | WebAssembly.Module | string | undefined }
-  | { type: 'make'; as: Reference; args: unknown[] }
-  /**
-   * Call of the method or property `name` of an object or class, or of a free function if `on` is undefined; `reports`
-   * requests reports of its progress. With `slices`, the options, `name` is one of the operations of `inSlices`.
-   */
-  | {
-      type: 'call';
-      on: Reference | ClassName | undefined;
-      name: string;
-      args: unknown[];
-      reports?: boolean;
-      slices?: { budgetMs?: number };
-    };
+/**
+ * Call of the method or property `name` of an object or class, or of a free function if `on` is undefined. With
+ * `slices`, the options, `name` is one of the operations of `inSlices`.
+ */
+export interface Call {
+  on: Reference | ClassName | undefined;
+  name: string;
+  args: unknown[];
+  slices?: SliceOptions;
+}
 
-/** A message from the page to the worker. */
-export type Request = (Task & { id: number }) | { type: 'abort'; id: number } | { type: 'free'; object: number };
+/** Requests of the page to the worker. */
+export interface Requests {
+  init: { body: BufferSource | WebAssembly.Module | string | undefined; reply: undefined };
+  make: { body: { as: Reference; args: unknown[] }; reply: undefined };
+  call: { body: Call; reply: unknown; report: Report };
+}
 
-/** A message from the worker to the page: an answer, or a report of a task in progress. */
-export type Reply =
-  | { type: 'value'; id: number; value: unknown }
-  | { type: 'error'; id: number; failure: Failure }
-  | { type: 'report'; id: number; report: Report };
+/** Message to free an object, by its id. */
+export interface Free {
+  free: number;
+}
+
+/** The page's connection to the worker. */
+export type Connection = Channel<Requests, never, Free>;
 
 /** Content of a report: the state after a step of a run, or the fraction done, 0..1, of a coverage measurement. */
 export type Report = StepReport | number;
@@ -48,14 +49,6 @@ export type Report = StepReport | number;
  * their reports; empty if they have none.
  */
 export const ABORTABLE = { run: 'onStep', coverage: 'onProgress', create: '', propose: '' } as const;
-
-/** An error of the worker, serialised so that the page can create an equal one. */
-export type Failure =
-  | { kind: 'error'; code: ErrorCode; message: string }
-  | { kind: 'crash'; message: string; cause: Error | undefined }
-  | { kind: 'aborted' }
-  /** Any other error, with its name, which structured cloning loses unless the error is one of JavaScript's own. */
-  | { kind: 'other'; name: string; error: Error };
 
 type Kind<T> = T extends (...args: never) => unknown
   ? 'method'

@@ -1,6 +1,5 @@
 // The page's proxies of the objects in the worker.
 
-import { onAbort } from './abort.js';
 import { checkProperties, invalid } from './check.js';
 import { type CoverageOptions, checkedCoverage } from './coverage.js';
 import { VesicleError } from './error.js';
@@ -8,6 +7,7 @@ import { mark } from './kind.js';
 import type { MeshArrays, PositionOptions } from './mesh.js';
 import { checkedRun, checkedSlices, type RunOptions, type SliceOptions } from './stepper.js';
 import {
+  type Connection,
   isPlain,
   isReference,
   MEMBERS,
@@ -16,10 +16,8 @@ import {
   type Report,
   SLICED,
   STATICS,
-  type Task,
 } from './worker-protocol.js';
-import type { Session } from './worker-session.js';
-import { currentSession } from './worker-start.js';
+import { currentConnection } from './worker-start.js';
 import type { ClassName, FunctionName, RemoteClass, RemoteFunction } from './worker-types.js';
 
 const markedForTransfer = new WeakSet<object>();
@@ -37,13 +35,13 @@ export function transfer<T extends object>(value: T): T {
   return value;
 }
 
-/** Identity and state of a remote object: its reference, the session it belongs to, and whether it was freed. */
+/** Identity and state of a remote object: its reference, the connection to its worker, and whether it was freed. */
 class RemoteState {
   freed = false;
 
   constructor(
     readonly reference: Reference,
-    readonly session: Session | undefined,
+    readonly connection: Connection | undefined,
     /** The error that kept the request for the object's creation from being posted; undefined if it was posted. */
     readonly failed?: unknown,
     /** For a live mesh: its model, which must not be garbage-collected while the mesh is used. */
@@ -57,7 +55,7 @@ const finalizers = new FinalizationRegistry<RemoteState>(release);
 
 function release(state: RemoteState): void {
   state.freed = true;
-  state.session?.free(state.reference.vesicle);
+  state.connection?.post({ free: state.reference.vesicle });
 }
 
 /** Base class of the page's proxies of objects in the worker. */
@@ -76,9 +74,9 @@ class Remote {
 
   /** Returns the proxy of the live mesh in the model's property `name`, the same object at every call. */
   part(name: string): Remote {
-    const { reference, session, failed } = this.#state;
+    const { reference, connection, failed } = this.#state;
     const made = () =>
-      new classes.Mesh(new RemoteState({ ...reference, class: 'Mesh', part: name }, session, failed, this));
+      new classes.Mesh(new RemoteState({ ...reference, class: 'Mesh', part: name }, connection, failed, this));
     const part = this.#parts.get(name) ?? made();
     this.#parts.set(name, part);
     return part;
@@ -97,24 +95,24 @@ class Remote {
 }
 
 /**
- * Returns the session, the connection to the worker, of a proxy. Throws if the proxy cannot be used: its object was not
- * created or was freed, or its worker ended.
+ * Returns the connection to the worker of a proxy. Throws if the proxy cannot be used: its object was not created or was
+ * freed, or its worker ended.
  */
-function sessionOf(remote: Remote): Session {
-  const { failed, session, reference, owner } = stateOf(remote);
+function connectionOf(remote: Remote): Connection {
+  const { failed, connection, reference, owner } = stateOf(remote);
   if (failed !== undefined) throw failed;
   const { freed } = owner ? stateOf(owner) : stateOf(remote);
   if (freed) throw new VesicleError('freed', `this ${reference.class} was freed and can no longer be used`);
-  if (session === currentSession()) return session;
+  if (connection === currentConnection()) return connection;
   throw new VesicleError('freed', `this ${reference.class} was lost when its worker ended; make a new one`);
 }
 
 /**
- * Returns the reference of a proxy, for messages to the worker; throws, as `sessionOf` does, if the proxy cannot be
+ * Returns the reference of a proxy, for messages to the worker; throws, as `connectionOf` does, if the proxy cannot be
  * used.
  */
 function referenceOf(remote: Remote): Reference {
-  sessionOf(remote);
+  connectionOf(remote);
   return stateOf(remote).reference;
 }
 
@@ -169,96 +167,58 @@ function copyOfView(path: string, array: ArrayBufferView): ArrayBufferView {
 }
 
 /** Converts a result from the worker for the page: references become proxies. */
-function deserialize(value: unknown, session: Session): unknown {
+function deserialize(value: unknown, connection: Connection): unknown {
   return mapObjects('', value, (_, found) => {
-    if (isReference(found)) return new classes[found.class](new RemoteState(found, session));
+    if (isReference(found)) return new classes[found.class](new RemoteState(found, connection));
     return ArrayBuffer.isView(found) ? found : undefined;
   });
 }
 
-/**
- * Posts a call of `name` on an object, on a class, or of a free function (`on` is undefined) to the worker, and
- * resolves with its result.
- */
-async function post(
-  session: Session,
-  on: Remote | ClassName | undefined,
-  name: string,
-  args: unknown[],
-): Promise<unknown> {
+/** What is called: an object or a class; undefined for a free function. */
+type Target = Remote | ClassName | undefined;
+
+/** Posts a call of `name` to the worker, and resolves with its result. */
+async function post(on: Target, name: string, args: readonly unknown[], more: Extras = {}): Promise<unknown> {
+  const { signal, listener, slices } = more;
+  signal?.throwIfAborted();
+  const connection = on instanceof Remote ? connectionOf(on) : currentConnection();
   const target = on instanceof Remote ? referenceOf(on) : on;
   const sent = serialize(args);
-  const { answer } = session.post({ type: 'call', on: target, name, args: sent.args }, { ...sent, target: on });
-  return deserialize(await answer, session);
+  const call = { on: target, name, args: sent.args, ...(slices && { slices }) };
+  return connection.request('call', call, {
+    ...{ transfer: sent.transfer, holds: on, signal, onReport: listener },
+    // Also of an aborted call: an object that is not needed any more is freed with its proxy.
+    receive: (value) => deserialize(value, connection),
+  });
 }
 
 async function run(remote: Remote, given?: RunOptions): Promise<unknown> {
   const { signal, onStep, ...rest } = checkedRun(given);
-  return abortable(remote, 'run', [rest], signal, { listener: onStep as Listener | undefined });
+  return post(remote, 'run', [rest], { signal, listener: onStep as Listener | undefined });
 }
 
 async function coverage(remote: Remote, given?: CoverageOptions): Promise<unknown> {
   const { signal, onProgress, ...rest } = checkedCoverage(given);
-  return abortable(remote, 'coverage', [rest], signal, { listener: onProgress as Listener | undefined });
+  return post(remote, 'coverage', [rest], { signal, listener: onProgress as Listener | undefined });
 }
 
 type Listener = (report: Report) => void;
 
-/**
- * Calls an abortable method of an object or a class in the worker. Signal and listener stay on the page: the signal posts
- * an abort message, the listener is called with the reports received.
- */
-async function abortable(
-  on: Remote | ClassName,
-  name: string,
-  args: readonly unknown[],
-  signal: AbortSignal | undefined,
-  { listener, slices }: { listener?: Listener | undefined; slices?: SliceOptions } = {},
-): Promise<unknown> {
-  signal?.throwIfAborted();
-  const session = on instanceof Remote ? sessionOf(on) : currentSession();
-  const stop = new AbortController();
-  const onReport = listener && ((report: Report) => notify(listener, report, stop));
-  const target = on instanceof Remote ? referenceOf(on) : on;
-  const sent = serialize(args);
-  const call = { on: target, name, args: sent.args, reports: !!listener };
-  const task: Task = { type: 'call', ...call, ...(slices && { slices }) };
-  const { id, answer } = session.post(task, { ...sent, target: on, onReport });
-  const forget = onAbort(signal, () => stop.abort(signal?.reason));
-  stop.signal.addEventListener('abort', () => session.abort(id));
-  try {
-    // An object that is not needed any more is freed with its proxy.
-    const result = deserialize(await answer, session);
-    stop.signal.throwIfAborted();
-    return result;
-  } catch (error) {
-    // Rejects with the abort reason, but with the worker's failure if it has ended.
-    throw stop.signal.aborted && !session.ended ? stop.signal.reason : error;
-  } finally {
-    forget();
-  }
-}
-
-/**
- * Calls the page's listener with a report; if it throws, aborts the task, though the worker may be some steps ahead.
- */
-function notify(listener: Listener, report: Report, stop: AbortController): void {
-  if (stop.signal.aborted) return;
-  try {
-    listener(report);
-  } catch (error) {
-    stop.abort(error);
-  }
+/** What stays on the page when an abortable method is called, and options of an operation of `inSlices`. */
+interface Extras {
+  signal?: AbortSignal | undefined;
+  listener?: Listener | undefined;
+  slices?: SliceOptions;
 }
 
 /** Implements `Mesh.copyTo`: the buffers of `out` are transferred to the worker and back. */
 async function copyTo(remote: Remote, out: MeshArrays, options?: PositionOptions): Promise<unknown> {
   const known = ['positions', 'origin', 'normals', 'indices', 'uvs', 'colors'];
   const { uvs, colors, origin: _, ...given } = checkProperties('out', out, known);
-  const session = sessionOf(remote);
+  const connection = connectionOf(remote);
   const sent = serialize([transfer({ ...given, ...(uvs && { uvs }), ...(colors && { colors }) }), options]);
-  const task: Task = { type: 'call', on: referenceOf(remote), name: 'copyTo', args: sent.args };
-  const { answer } = session.post(task, { ...sent, target: remote });
+  const call = { on: referenceOf(remote), name: 'copyTo', args: sent.args };
+  const answer = connection.request('call', call, { transfer: sent.transfer, holds: remote });
   // Transferred arrays cannot be sent again until they are back.
   Object.assign(out, { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() });
   for (const name of ['uvs', 'colors', 'origin'] as const) delete out[name];
@@ -267,17 +227,21 @@ async function copyTo(remote: Remote, out: MeshArrays, options?: PositionOptions
   return counts;
 }
 
+/** Id of the object that was requested last. */
+let lastId = 0;
+
 /**
  * Requests the creation of an object in the worker; if the request fails, every later use of the object fails with the
  * same error.
  */
 function make(name: ClassName, args: readonly unknown[]): { state: RemoteState; created: Promise<unknown> } {
   try {
-    const session = currentSession();
-    const reference = { vesicle: session.nextId(), class: name };
-    const sent = serialize(args);
-    const { answer } = session.post({ type: 'make', as: reference, args: sent.args }, sent);
-    return { state: new RemoteState(reference, session), created: answer };
+    const connection = currentConnection();
+    lastId += 1;
+    const reference = { vesicle: lastId, class: name };
+    const { args: given, transfer } = serialize(args);
+    const created = connection.request('make', { as: reference, args: given }, { transfer });
+    return { state: new RemoteState(reference, connection), created };
   } catch (error) {
     return { state: new RemoteState({ vesicle: 0, class: name }, undefined, error), created: Promise.reject(error) };
   }
@@ -297,7 +261,7 @@ function remoteClass(name: ClassName): Class {
   const proxy = named[name] as unknown as Class;
   mark(proxy.prototype, name, true);
   for (const method of Object.keys(STATICS[name])) {
-    const call = async (...args: unknown[]) => post(currentSession(), name, method, args);
+    const call = async (...args: unknown[]) => post(name, method, args);
     define(proxy, method, { value: method === 'propose' ? propose : call });
   }
   for (const [member, kind] of Object.entries(MEMBERS[name]))
@@ -313,7 +277,7 @@ function inSlices(remote: Remote, operations: object, options?: SliceOptions): R
   const { signal, ...slices } = checkedSlices(options);
   const operation = (name: string) => [
     name,
-    async (...args: unknown[]) => abortable(remote, name, args, signal, { slices }),
+    async (...args: unknown[]) => post(remote, name, args, { signal, slices }),
   ];
   return Object.fromEntries(Object.keys(operations).map(operation));
 }
@@ -323,7 +287,7 @@ const SPECIAL: Record<string, (remote: Remote, ...args: never[]) => Promise<unkn
 function memberOf(of: ClassName, name: string, kind: string): PropertyDescriptor {
   const special = Object.hasOwn(SPECIAL, name) ? SPECIAL[name] : undefined;
   const call = async (remote: Remote, args: unknown[]) =>
-    special ? special(remote, ...(args as never[])) : post(sessionOf(remote), remote, name, args);
+    special ? special(remote, ...(args as never[])) : post(remote, name, args);
   if (name === 'inSlices') {
     const operations = SLICED[of as keyof typeof SLICED];
     return { value: asMethod((remote, [options]) => inSlices(remote, operations, options as SliceOptions)) };
@@ -370,14 +334,14 @@ function creator(proxy: Class, name: ClassName): (...args: unknown[]) => Promise
 /** Implements `SurfaceTracker.propose`, which can be aborted. */
 async function propose(volume: unknown, query?: unknown, options?: SliceOptions): Promise<unknown> {
   const { signal, ...rest } = checkedSlices(options);
-  return abortable('SurfaceTracker', 'propose', [volume, query, rest], signal);
+  return post('SurfaceTracker', 'propose', [volume, query, rest], { signal });
 }
 
 /** Returns the static method that creates an object in slices, which can be aborted. */
 function slicedCreator(name: ClassName): (given: unknown, options?: SliceOptions) => Promise<unknown> {
   return async (given, options) => {
     const { signal, ...rest } = checkedSlices(options);
-    return abortable(name, 'create', [given, rest], signal);
+    return post(name, 'create', [given, rest], { signal });
   };
 }
 
@@ -390,6 +354,6 @@ export const remoteClasses = classes as unknown as { readonly [N in ClassName]: 
 
 /** Returns an asynchronous function that calls the free function `name` of the library in the worker. */
 export function remoteFunction<N extends FunctionName>(name: N): RemoteFunction<N> {
-  const call = async (...args: unknown[]) => post(currentSession(), undefined, name, args);
+  const call = async (...args: unknown[]) => post(undefined, name, args);
   return call as unknown as RemoteFunction<N>;
 }

@@ -1,9 +1,9 @@
 // Starts and terminates the worker, for any origin of page and package.
+import { Channel, type NodeWorker } from './channel.js';
 import { checkProperties } from './check.js';
 import { VesicleError } from './error.js';
 import type { InitInput, ModuleOptions } from './runtime.js';
-import type { Task } from './worker-protocol.js';
-import { type NodeWorker, Session } from './worker-session.js';
+import type { Connection, Requests } from './worker-protocol.js';
 
 /** Options of {@link init} of `vesicle/worker`. */
 export interface WorkerInit extends ModuleOptions {
@@ -15,7 +15,7 @@ export interface WorkerInit extends ModuleOptions {
   worker?: Worker | NodeWorker;
 }
 
-let session: Session | undefined;
+let connection: Connection | undefined;
 let starting: Promise<void> | undefined;
 // Number of starts, to recognise one that was cancelled meanwhile.
 let startCount = 0;
@@ -28,8 +28,8 @@ let startCount = 0;
  *   call tries again.
  */
 export function init(given: WorkerInit = {}): Promise<void> {
-  if (session?.ended) {
-    session = undefined;
+  if (connection?.ended) {
+    connection = undefined;
     starting = undefined;
   }
   starting ??= startOnce(given);
@@ -43,12 +43,12 @@ export function init(given: WorkerInit = {}): Promise<void> {
 export function terminate(): void {
   startCount += 1;
   starting = undefined;
-  session?.end(terminated());
+  connection?.end(terminated());
 }
 
-/** Returns the session, the connection to the current worker; throws `invalid-argument` before {@link init}. */
-export function currentSession(): Session {
-  if (session) return session;
+/** Returns the connection to the current worker; throws `invalid-argument` before {@link init}. */
+export function currentConnection(): Connection {
+  if (connection) return connection;
   throw new VesicleError('invalid-argument', 'init: call `await init()` before anything else');
 }
 
@@ -72,24 +72,24 @@ async function start(given: WorkerInit, own: number): Promise<void> {
     worker,
   } = checkProperties('options', given, ['module', 'module_or_path', 'worker']);
   const module = await sendable(await (one ?? module_or_path));
-  const started = new Session(worker ?? (globalThis.Worker ? browserWorker() : await nodeWorker()));
-  if (own === startCount) session = started;
+  const started: Connection = new Channel(worker ?? (globalThis.Worker ? browserWorker() : await nodeWorker()));
+  if (own === startCount) connection = started;
   else started.end(terminated());
-  await started.post({ type: 'init', module }).answer;
+  await started.request('init', module);
 }
 
-/** Ends the session with the worker after a failed start; a later call of `init` tries again. */
+/** Ends the connection to the worker after a failed start; a later call of `init` tries again. */
 function resetAfterFailure(error: unknown): void {
   starting = undefined;
-  session?.end(error instanceof Error ? error : new Error(String(error)));
-  session = undefined;
+  connection?.end(error instanceof Error ? error : new Error(String(error)));
+  connection = undefined;
 }
 
 /**
  * Converts the source of the WebAssembly module into a form that can be posted to the worker; relative addresses are
  * resolved against the page.
  */
-async function sendable(source: InitInput | undefined): Promise<Extract<Task, { type: 'init' }>['module']> {
+async function sendable(source: InitInput | undefined): Promise<Requests['init']['body']> {
   if (source === undefined || source instanceof WebAssembly.Module) return source;
   if (source instanceof ArrayBuffer || ArrayBuffer.isView(source)) return source;
   if (source instanceof URL) return source.href;

@@ -54,6 +54,7 @@ import type * as vesicle from './index.js';
 import { remoteClasses, remoteFunction } from './worker-remote.js';
 import type * as there from './worker-types.js';
 
+export type { NodeWorker } from './channel.js';
 export { NeedsDataError, VesicleCrash, VesicleError } from './error.js';
 export type {
   Attractor,
@@ -100,7 +101,6 @@ export type {
   VoxelKind,
 } from './index.js';
 export { transfer } from './worker-remote.js';
-export type { NodeWorker } from './worker-session.js';
 export { init as default, terminate, type WorkerInit } from './worker-start.js';
 export type { Remote, Stepper } from './worker-types.js';
 

@@ -208,6 +208,7 @@ async function manifest(modules) {
       ...Object.fromEntries(PARTS.flatMap(entry)),
       './inline': { types: './index.d.ts', default: './inline.js' },
       './worker': { types: './worker.d.ts', default: './worker.js' },
+      './channel': { types: './channel.d.ts', default: './channel.js' },
       './worker-host': { types: './worker-host.d.ts', default: './worker-host.js' },
       ...Object.fromEntries(ADAPTERS.map((name) => [`./${name}`, adapter(name)])),
       ...Object.fromEntries(FORMATS.map(format)),

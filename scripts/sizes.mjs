@@ -17,6 +17,7 @@ const ENTRIES = {
   'vesicle/inline': 'inline.js',
   'vesicle/worker': 'worker.js',
   'vesicle/worker-host': 'worker-host.js',
+  'vesicle/channel': 'channel.js',
   'vesicle/three': 'adapters/three.js',
   'vesicle/niivue': 'adapters/niivue.js',
   'vesicle/vtk': 'adapters/vtk.js',

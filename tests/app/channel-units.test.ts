@@ -1,12 +1,13 @@
 // A worker begins when the one before has ended, so that their memory is not taken at the same time.
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
-import { Channel } from '../../www/src/engine/channel';
+import { EngineChannel } from '../../www/src/engine/channel';
 
 type Requests = { open: { body: string; reply: string } };
 interface Message {
   id: number;
   kind: string;
   body: string;
+  lock: string;
 }
 
 /** Locks of the page, each held until its worker is said to have ended. */
@@ -15,7 +16,7 @@ const workers: FakeWorker[] = [];
 
 /** A worker that answers at once, and holds its lock also when it is terminated. */
 class FakeWorker {
-  onmessage: ((event: { data: unknown }) => void) | undefined;
+  #listener: ((event: { data: unknown }) => void) | undefined;
   readonly kinds: string[] = [];
   isTerminated = false;
   #ended: () => void = () => undefined;
@@ -24,11 +25,15 @@ class FakeWorker {
     workers.push(this);
   }
 
-  postMessage({ id, kind, body }: Message): void {
+  addEventListener(type: string, listener: (event: { data: unknown }) => void): void {
+    if (type === 'message') this.#listener = listener;
+  }
+
+  postMessage({ id, kind, body, lock }: Message): void {
     this.kinds.push(kind);
-    if (kind === 'hold') held.set(body, () => undefined);
-    if (kind === 'hold') this.#ended = () => held.get(body)?.();
-    else queueMicrotask(() => this.onmessage?.({ data: { id, ok: true, body } }));
+    if (kind === 'hold') held.set(lock, () => undefined);
+    if (kind === 'hold') this.#ended = () => held.get(lock)?.();
+    else queueMicrotask(() => this.#listener?.({ data: { id, value: body } }));
   }
 
   terminate(): void {
@@ -41,7 +46,7 @@ class FakeWorker {
 }
 
 const open = () =>
-  new Channel<Requests, never>(
+  new EngineChannel<Requests, never>(
     () => new FakeWorker() as unknown as Worker,
     () => undefined,
   );

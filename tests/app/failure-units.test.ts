@@ -1,15 +1,15 @@
 // Errors of workers as the page shows them.
 import { expect, test } from 'vitest';
 import { VesicleError } from '../../pkg/index.js';
-import { toFailure } from '../../www/src/engine/refusal';
+import { workerFailure } from '../../www/src/engine/failure';
 
 test('a message has no advice for those who call the library', () => {
   const needs = '9 bytes are needed, more than is left of the 4 GiB of WebAssembly';
   for (const advice of [': free() what is no longer needed', ' (free() what is no longer needed)']) {
-    const failure = toFailure(new VesicleError('too-large', `${needs}${advice}`));
+    const failure = workerFailure(new VesicleError('too-large', `${needs}${advice}`));
     expect(failure).toEqual({ code: 'too-large', message: needs });
   }
-  expect(toFailure(new VesicleError('bad-file', 'NRRD: (a) sizes: 1'))).toMatchObject({
+  expect(workerFailure(new VesicleError('bad-file', 'NRRD: (a) sizes: 1'))).toMatchObject({
     message: 'NRRD: (a) sizes: 1',
   });
 });

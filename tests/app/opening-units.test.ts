@@ -1,6 +1,6 @@
 /** Opening data in a lab: what is open after something could be opened in part only. */
 import { expect, test } from 'vitest';
-import { RequestError } from '../../www/src/engine/channel';
+import { RequestError } from '../../www/src/engine/failure';
 import { type LabData, Opening, type Source } from '../../www/src/lab/opening';
 import type { Session } from '../../www/src/lab/session/check';
 import { LabStates } from '../../www/src/lab/states';

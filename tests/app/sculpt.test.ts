@@ -321,8 +321,7 @@ describe('an example', LONG, () => {
   test('opened while the previous one is about to play never runs that one', async () => {
     const page = await anotherPage(app, () => {
       const { prototype } = Worker;
-      const { postMessage } = prototype;
-      const listeners = Object.getOwnPropertyDescriptor(prototype, 'onmessage');
+      const { postMessage, addEventListener } = prototype;
       const sent: string[] = [];
       let film = 0;
       let held: (() => void) | undefined;
@@ -333,15 +332,13 @@ describe('an example', LONG, () => {
         Reflect.apply(postMessage, this, given);
       };
       // The reply to the first request about a film is late, so that the lab waits with a scene that does not play yet.
-      Object.defineProperty(prototype, 'onmessage', {
-        set(this: Worker, listener: (event: MessageEvent) => void) {
-          const listen = (event: MessageEvent) => {
-            if (held || !film || event.data.id !== film) listener(event);
-            else held = () => listener(event);
-          };
-          listeners?.set?.call(this, listen);
-        },
-      });
+      prototype.addEventListener = function (this: Worker, type: string, listener: (event: MessageEvent) => void) {
+        const listen = (event: MessageEvent) => {
+          if (type !== 'message' || held || !film || event.data.id !== film) listener(event);
+          else held = () => listener(event);
+        };
+        Reflect.apply(addEventListener, this, [type, listen]);
+      } as typeof addEventListener;
       Object.assign(window, { sent, release: () => held?.(), isHeld: () => held !== undefined });
     });
     await page.goto(`${app.address}#sculpt?example=lava`);

@@ -18,6 +18,7 @@ export default defineConfig({
   resolve: {
     alias: [
       { find: /^vesicle(\/index)?$/, replacement: at('../../pkg/index.js') },
+      { find: 'vesicle/channel', replacement: at('../../pkg/channel.js') },
       { find: /^vesicle\/(import|gltf|tiff|zarr)$/, replacement: at('../../pkg/$1/index.js') },
     ],
   },

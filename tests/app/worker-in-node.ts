@@ -1,6 +1,6 @@
 /** Runs the code of a lab's worker in Node, and talks to it as the page does. */
 
-type Reply = { id: number; ok: boolean; body?: unknown; failure?: { code: string; message: string } };
+type Reply = { id: number; value?: unknown; failure?: { message: string; error?: Error } };
 type Table<Requests> = { [K in keyof Requests]: { body: unknown; reply: unknown } };
 
 /**
@@ -12,27 +12,31 @@ export async function startWorker<Requests extends Table<Requests>>(
   onEvent: (event: object) => void = () => undefined,
 ) {
   const pending = new Map<number, (reply: Reply) => void>();
+  let listener: ((event: { data: unknown }) => void) | undefined;
   const scope = {
-    onmessage: undefined as ((event: { data: unknown }) => void) | undefined,
-    postMessage: (message: object, options: StructuredSerializeOptions) => {
-      const data = structuredClone(message, options) as Reply;
+    addEventListener: (_: 'message', given: typeof listener) => {
+      listener = given;
+    },
+    postMessage: (message: object, transfer: Transferable[] = []) => {
+      const data = structuredClone(message, { transfer }) as Reply;
       if (!('id' in data)) return onEvent(data);
       pending.get(data.id)?.(data);
       pending.delete(data.id);
     },
   };
-  Object.assign(globalThis, { self: scope });
+  Object.assign(globalThis, scope);
   await load();
   let last = 0;
+  const send = (message: object) => listener?.({ data: structuredClone(message) });
   return {
-    post: (message: object) => scope.onmessage?.({ data: structuredClone(message) }),
+    post: send,
     request: async <K extends keyof Requests>(kind: K, body: Requests[K]['body']): Promise<Requests[K]['reply']> => {
       const id = ++last;
       const answer = new Promise<Reply>((resolve) => pending.set(id, resolve));
-      scope.onmessage?.({ data: structuredClone({ id, kind, body }) });
-      const { ok, body: reply, failure } = await answer;
-      if (!ok) throw new Error(failure?.message);
-      return reply;
+      send({ id, kind, body, reports: false });
+      const { value, failure } = await answer;
+      if (failure) throw new Error(failure.error?.message ?? failure.message);
+      return value;
     },
   };
 }

@@ -415,7 +415,7 @@ test('only the part of a buffer that an array covers is sent', async () => {
   const own = hostOf();
   const post = own.postMessage.bind(own);
   own.postMessage = (message, transfer) => {
-    if (message.name === 'parse') sent.push(message.args[0]);
+    if (message.body?.name === 'parse') sent.push(message.body.args[0]);
     post(message, transfer);
   };
   worker.terminate();
@@ -435,11 +435,11 @@ test('results are transferred', async () => {
     const { parentPort } = await import('node:worker_threads');
     const post = parentPort.postMessage.bind(parentPort);
     parentPort.postMessage = (message, buffers) => post({ ...message, value: buffers.length });`);
-  await answerTo(own, { type: 'init' });
+  await answerTo(own, 'init');
   const mesh = { vesicle: -1, class: 'Mesh' };
-  await answerTo(own, { type: 'call', on: 'Mesh', name: 'icosphere', args: [[0, 0, 0], 1, 1] });
-  expect((await answerTo(own, { type: 'call', on: mesh, name: 'arrays' })).value).toBe(3);
-  expect((await answerTo(own, { type: 'call', on: mesh, name: 'toBytes', args: ['stl'] })).value).toBe(1);
+  await answerTo(own, 'call', { on: 'Mesh', name: 'icosphere', args: [[0, 0, 0], 1, 1] });
+  expect((await answerTo(own, 'call', { on: mesh, name: 'arrays' })).value).toBe(3);
+  expect((await answerTo(own, 'call', { on: mesh, name: 'toBytes', args: ['stl'] })).value).toBe(1);
   await own.terminate();
 });
 
@@ -500,17 +500,21 @@ function hostOf(before = ''): NodeWorker {
 }
 
 /** Sends a raw request, which the library itself would not send, and returns the answer. */
-async function answerTo(own: NodeWorker, request: object): Promise<{ failure?: { message: string }; value?: unknown }> {
+async function answerTo(
+  own: NodeWorker,
+  kind: 'init' | 'make' | 'call',
+  body?: object,
+): Promise<{ failure?: { message: string }; value?: unknown }> {
   const answer = new Promise<object>((resolve) => own.once('message', resolve));
-  own.postMessage({ id: 1, args: [], ...request });
+  own.postMessage({ id: 1, kind, body: body && { args: [], ...body } });
   return answer;
 }
 
 test('names that are not in the tables are refused', async () => {
   const own = hostOf();
-  await answerTo(own, { type: 'init' });
+  await answerTo(own, 'init');
   const mesh = { vesicle: 7, class: 'Volume' };
-  await answerTo(own, { type: 'make', as: mesh, args: [{ data, dims: DIMS }] });
+  await answerTo(own, 'make', { as: mesh, args: [{ data, dims: DIMS }] });
   const calls = [
     { on: mesh, name: 'constructor' },
     { on: mesh, name: '__proto__' },
@@ -526,14 +530,14 @@ test('names that are not in the tables are refused', async () => {
     { name: 'hasOwnProperty' },
   ];
   for (const call of calls) {
-    const { failure } = await answerTo(own, { type: 'call', ...call });
+    const { failure } = await answerTo(own, 'call', call);
     expect(failure?.message, JSON.stringify(call)).toMatch(/no such member|not an object/);
   }
-  const { failure } = await answerTo(own, { type: 'make', as: { vesicle: 8, class: 'constructor' } });
+  const { failure } = await answerTo(own, 'make', { as: { vesicle: 8, class: 'constructor' } });
   expect(failure?.message).toContain('no such member');
   const polluting = JSON.parse('[{ "__proto__": { "levels": 3 } }]');
-  expect((await answerTo(own, { type: 'call', on: 'Volume', name: 'parse', args: polluting })).failure).toBeDefined();
-  expect((await answerTo(own, { type: 'call', on: mesh, name: 'dims' })).value).toEqual(DIMS);
+  expect((await answerTo(own, 'call', { on: 'Volume', name: 'parse', args: polluting })).failure).toBeDefined();
+  expect((await answerTo(own, 'call', { on: mesh, name: 'dims' })).value).toEqual(DIMS);
   await own.terminate();
 });
 
@@ -643,7 +647,7 @@ test('unreachable objects are freed in the worker, those in use are not', () => 
     const freed = new Set();
     const post = worker.postMessage.bind(worker);
     worker.postMessage = (message, transfer) => {
-      if (message.type === 'free') freed.add(message.object);
+      if ('free' in message) freed.add(message.free);
       post(message, transfer);
     };
     await init({ worker });

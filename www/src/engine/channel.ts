@@ -1,38 +1,8 @@
+import { Channel, type RequestTable, VesicleError } from 'vesicle/channel';
 import { text } from '../texts';
+import { RequestError, toFailure, workerFailure } from './failure';
 import type { Failure } from './protocol';
-
-/**
- * Error of a request that a lab's worker could not fulfil. `code` is that of a VesicleError, or 'internal' if the
- * engine (the worker's WebAssembly module) broke.
- */
-export class RequestError extends Error {
-  readonly code: string;
-
-  constructor(failure: Failure) {
-    super(failure.message);
-    this.name = 'RequestError';
-    this.code = failure.code;
-  }
-}
-
-/**
- * Converts any thrown value to a `Failure`, the error code and message that the page displays; an error that is no
- * `RequestError` gets the code 'page'.
- */
-export function toFailure(error: unknown): Failure {
-  if (error instanceof RequestError) return { code: error.code, message: error.message };
-  return { code: 'page', message: error instanceof Error ? error.message : String(error) };
-}
-
-interface PendingRequest {
-  resolve: (body: never) => void;
-  reject: (error: RequestError) => void;
-}
-
-/** Constraint on a lab's request table: maps the name of each request to the types of its body and reply. */
-type RequestTable<Requests> = { [K in keyof Requests]: { body: unknown; reply: unknown } };
-
-type Reply = { id: number; ok: true; body: unknown } | { id: number; ok: false; failure: Failure };
+import type { Hold } from './serving';
 
 /**
  * Worker that {@link preloadWorker} has started and no {@link Channel} has taken over yet; undefined if there is none.
@@ -75,28 +45,29 @@ async function released(lock: string): Promise<void> {
   await navigator.locks?.request(lock, { signal }, () => undefined).catch(() => undefined);
 }
 
+interface Waiting<Connection> {
+  send: (connection: Connection) => void;
+  refuse: (error: RequestError) => void;
+}
+
 /**
- * The page's connection to a lab's worker: requests return promises, events go to one listener, and a `Message` has no
- * reply.
+ * The page's connection to a lab's worker, which can be replaced by a new one: requests return promises, events go to
+ * one listener, and a `Message` has no reply.
  */
-export class Channel<
+export class EngineChannel<
   Requests extends RequestTable<Requests>,
   Event extends { event: string },
   Message extends { kind: string } = never,
 > {
   readonly #spawn: () => Worker;
   readonly #onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void;
-  readonly #pending = new Map<number, PendingRequest>();
-  /** The worker; undefined until the one before has ended. */
-  #worker: Worker | undefined;
+  /** The connection to the worker; undefined until the one before has ended. */
+  #connection: Channel<Requests, Event, Message | Hold> | undefined;
   /** Name of the lock that the worker holds until it has ended. */
   #lock = '';
-  /** Messages that wait for the worker. */
-  #unsent: [message: object, transfer: Transferable[]][] = [];
+  /** Requests and messages that wait for the worker. */
+  #waiting: Waiting<Channel<Requests, Event, Message | Hold>>[] = [];
   #isClosed = false;
-  /** Failure that broke the worker, if any; every request is rejected with it until the worker is restarted. */
-  #failure: Failure | undefined;
-  #lastId = 0;
 
   constructor(spawn: () => Worker, onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void) {
     this.#spawn = spawn;
@@ -104,27 +75,30 @@ export class Channel<
     this.#start();
   }
 
-  request<K extends keyof Requests>(
+  request<K extends keyof Requests & string>(
     kind: K,
     body: Requests[K]['body'],
     transfer: Transferable[] = [],
   ): Promise<Requests[K]['reply']> {
-    if (this.#failure) return Promise.reject(new RequestError(this.#failure));
-    const id = ++this.#lastId;
     return new Promise((resolve, reject) => {
-      this.#pending.set(id, { resolve, reject });
-      this.#send({ id, kind, body }, transfer);
+      const refuse = (error: RequestError) => this.#isClosed || reject(error);
+      const send = (connection: Channel<Requests, Event, Message | Hold>) => {
+        // It throws, and does not reject, where nothing can be sent.
+        const answered = async () => connection.request(kind, body, { transfer });
+        void answered().then(resolve, (error) => refuse(requestError(error, connection.ended)));
+      };
+      this.#send({ send, refuse });
     });
   }
 
   /** Posts a message that has no reply to the worker. */
   post(message: Message, transfer: Transferable[] = []): void {
-    this.#send(message, transfer);
+    this.#send({ send: (connection) => connection.post(message, transfer), refuse: () => undefined });
   }
 
-  #send(message: object, transfer: Transferable[]): void {
-    if (this.#worker) this.#worker.postMessage(message, transfer);
-    else this.#unsent.push([message, transfer]);
+  #send(one: Waiting<Channel<Requests, Event, Message | Hold>>): void {
+    if (this.#connection) one.send(this.#connection);
+    else this.#waiting.push(one);
   }
 
   /**
@@ -132,62 +106,40 @@ export class Channel<
    * rejected with `failure`.
    */
   restart(failure: Failure): void {
-    this.#fail(failure);
-    this.#failure = undefined;
-    this.#unsent = [];
+    const error = new RequestError(failure);
+    for (const { refuse } of this.#waiting) refuse(error);
+    this.#waiting = [];
     // The one before, which has not ended, is waited for already.
-    if (!this.#worker) return;
-    this.#worker.terminate();
-    this.#worker = undefined;
+    if (!this.#connection) return;
+    this.#connection.end(error);
+    this.#connection = undefined;
     void released(this.#lock).then(() => this.#isClosed || this.#start());
   }
 
   /** Terminates the worker and frees its memory. Pending requests are never settled, since the lab is being closed. */
   close(): void {
-    this.#worker?.terminate();
     this.#isClosed = true;
-    this.#pending.clear();
+    this.#connection?.end(new Error('the lab was closed'));
   }
 
   #start(): void {
-    const worker = takeWorker(this.#spawn);
-    this.#worker = worker;
+    const connection = new Channel<Requests, Event, Message | Hold>(takeWorker(this.#spawn), {
+      onEvent: this.#onEvent,
+      onEnd: (error) => this.#onEvent({ event: 'failure', failure: toFailure(requestError(error, error)) }),
+    });
+    this.#connection = connection;
     this.#lock = `${LOCK} ${Math.random()}`;
-    worker.postMessage({ id: 0, kind: 'hold', body: this.#lock });
-    for (const [message, transfer] of this.#unsent) worker.postMessage(message, transfer);
-    this.#unsent = [];
-    worker.onmessage = ({ data }: MessageEvent<Reply | Event>) => this.#receive(data);
-    worker.onerror = (event) => {
-      // The page shows the error; the console need not repeat it.
-      event.preventDefault();
-      this.#broken(event.message || text('shell.workerFailed'));
-    };
-    worker.onmessageerror = () => this.#broken(text('shell.messageUnreadable'));
+    connection.post({ kind: 'hold', lock: this.#lock });
+    for (const { send } of this.#waiting) send(connection);
+    this.#waiting = [];
   }
+}
 
-  #receive(message: Reply | Event): void {
-    if ('event' in message) this.#onEvent(message);
-    else this.#settle(message);
-  }
-
-  #settle(reply: Reply): void {
-    const request = this.#pending.get(reply.id);
-    this.#pending.delete(reply.id);
-    if (reply.ok) request?.resolve(reply.body as never);
-    else request?.reject(new RequestError(reply.failure));
-  }
-
-  #broken(message: string): void {
-    const failure: Failure = { code: 'internal', message };
-    this.#failure = failure;
-    // Its further results could not be trusted.
-    this.#worker?.terminate();
-    this.#fail(failure);
-    this.#onEvent({ event: 'failure', failure });
-  }
-
-  #fail(failure: Failure): void {
-    for (const { reject } of this.#pending.values()) reject(new RequestError(failure));
-    this.#pending.clear();
-  }
+/** Converts an error of a connection, which may be the one with which it has ended. */
+function requestError(error: unknown, ended: Error | undefined): RequestError {
+  if (error instanceof RequestError) return error;
+  const hasNotStarted = error === ended && !(error instanceof VesicleError);
+  return new RequestError(
+    hasNotStarted ? { code: 'internal', message: text('shell.workerFailed') } : workerFailure(error),
+  );
 }

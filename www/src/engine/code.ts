@@ -1,10 +1,11 @@
 /** Writes the log of a run as JavaScript that repeats the run to the same bits with the package alone. */
+
 import { paramSpecs, type Volume, version } from 'vesicle';
+import { VesicleError } from 'vesicle/channel';
 import { text } from '../texts';
 import { callOf } from './edits';
 import { literal } from './literal';
 import type { CodeRequest, NamedBytes, ParamValues, RunCode } from './protocol';
-import { Refusal } from './refusal';
 import type { Call, RunLog } from './run-log';
 
 /** Code of a run, as far as it differs between the labs. */
@@ -83,7 +84,7 @@ export function toCode<Setup>(
   programOf: (setup: Setup) => Program,
   edits: CodeRequest['edits'],
 ): RunCode {
-  if (!log) throw new Refusal('page', text('sessions.unknownBeginning'));
+  if (!log) throw new VesicleError('invalid-argument', text('sessions.unknownBeginning'));
   const { names, imports = [], parameters = [], given, mesh = 'model.mesh', ...program } = programOf(log.setup);
   const bytes = `${mesh}.toBytes('ply')`;
   const statements = [
@@ -114,6 +115,6 @@ export function toCode<Setup>(
 
 function statementOf({ calls }: Pick<Program, 'calls'>, { call, given }: Call): string {
   const statement = Object.hasOwn(calls, call) && calls[call];
-  if (!statement) throw new Refusal('bad-file', text('sessions.unknownCall', { call }));
+  if (!statement) throw new VesicleError('bad-file', text('sessions.unknownCall', { call }));
   return statement(given as never);
 }

@@ -1,26 +1,33 @@
-import { VesicleError } from 'vesicle';
+import { VesicleError } from 'vesicle/channel';
 import type { Failure } from './protocol';
 
 /**
- * Error for a request that the app's own code rejects, such as a bad file or a request without a model; has the code of
- * a VesicleError.
+ * Error of a request that a lab's worker could not fulfil. `code` is that of a VesicleError, or 'internal' if the
+ * engine (the worker's WebAssembly module) broke.
  */
-export class Refusal extends Error {
+export class RequestError extends Error {
   readonly code: string;
 
-  constructor(code: string, message: string) {
-    super(message);
-    this.code = code;
+  constructor(failure: Failure) {
+    super(failure.message);
+    this.name = 'RequestError';
+    this.code = failure.code;
   }
 }
 
 /**
- * Converts an error to a message for the page; errors that are neither the library's nor a {@link Refusal} get the code
- * 'internal'.
+ * Converts any thrown value to a `Failure`, the error code and message that the page displays; an error that is no
+ * `RequestError` gets the code 'page'.
  */
 export function toFailure(error: unknown): Failure {
-  const isKnown = error instanceof VesicleError || error instanceof Refusal;
-  if (isKnown && error.code !== 'crash') return { code: error.code, message: forUsers(error.message) };
+  if (error instanceof RequestError) return { code: error.code, message: error.message };
+  return { code: 'page', message: error instanceof Error ? error.message : String(error) };
+}
+
+/** Converts an error in a worker to a `Failure`; errors that are not the library's get the code 'internal'. */
+export function workerFailure(error: unknown): Failure {
+  if (error instanceof VesicleError && error.code !== 'crash')
+    return { code: error.code, message: forUsers(error.message) };
   return { code: 'internal', message: error instanceof Error ? error.message : String(error) };
 }
 

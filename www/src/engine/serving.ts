@@ -1,6 +1,6 @@
 /** Common parts of the app's workers: loading the engine, replies to requests, and work that can be cancelled. */
 import init, { paramSpecs, version } from 'vesicle';
-import { toFailure } from './refusal';
+import { type Handlers as AllHandlers, type RequestTable, serve as serveChannel } from 'vesicle/channel';
 
 /** Work of a session that takes long, which a later request of the page can abort. */
 export class Work {
@@ -39,23 +39,19 @@ export class Work {
 }
 
 /** Handlers of the requests in a lab's table. */
-export type Handlers<Requests extends { [K in keyof Requests]: { body: unknown; reply: unknown } }> = {
-  [K in Exclude<keyof Requests, 'hello'>]: (
-    body: Requests[K]['body'],
-  ) => Promise<Requests[K]['reply']> | Requests[K]['reply'];
-};
+export type Handlers<Requests extends RequestTable<Requests>> = Omit<AllHandlers<Requests>, 'hello'>;
 
-/** Returns a function that sends events to the page. */
-export const sender =
-  <Event>() =>
-  (event: Event, transfer: Transferable[] = []): void =>
-    self.postMessage(event, { transfer });
+/** A lock to be held until the worker has ended, so that the page knows when its memory is given back. */
+export interface Hold {
+  kind: 'hold';
+  lock: string;
+}
 
 /**
  * Loads the engine at once, while the page still loads, and serves the page's requests with `handlers`; a failure to
  * load is reported when the page asks for the parameters of `method` (`hello`), of which there are none without a method. Messages without reply go to `onMessage`.
  */
-export function serve<Message extends { kind: string }>(
+export function serveLab<Message extends { kind: string }>(
   method: Parameters<typeof paramSpecs>[0] | undefined,
   handlers: object,
   onMessage?: (message: Message) => void,
@@ -66,46 +62,40 @@ export function serve<Message extends { kind: string }>(
     await starting;
     return { version: version(), specs: method ? paramSpecs(method) : [] };
   };
-  self.onmessage = ({ data }: MessageEvent<Message | { id: number; kind: string; body: unknown }>) => {
-    if ('id' in data) void reply({ ...handlers, hello }, data);
-    else onMessage?.(data);
-  };
+  serve({ ...handlers, hello }, onMessage);
+}
+
+/** Serves the page's requests with `handlers` as soon as the worker is `ready`. */
+export function serveWhenReady<Requests extends RequestTable<Requests>>(
+  ready: Promise<unknown>,
+  handlers: AllHandlers<Requests>,
+): void {
+  ready.catch(() => undefined);
+  const waiting = Object.entries<(...given: never[]) => unknown>(handlers).map(([kind, handle]) => [
+    kind,
+    async (...given: never[]) => {
+      await ready;
+      return handle(...given);
+    },
+  ]);
+  serve(Object.fromEntries(waiting));
+}
+
+/** Serves the page's requests with `handlers`. Messages without reply go to `onMessage`. */
+export function serve<Message extends { kind: string }>(
+  handlers: object,
+  onMessage?: (message: Message) => void,
+): void {
+  serveChannel(handlers, (message: Message | Hold) => {
+    if ('lock' in message) hold(message);
+    else onMessage?.(message);
+  });
+}
+
+function hold({ lock }: Hold): void {
+  void navigator.locks?.request(lock, () => new Promise(() => undefined));
 }
 
 export function buffersOf(arrays: ArrayBufferView[]): Transferable[] {
   return arrays.map((array) => array.buffer as ArrayBuffer);
-}
-
-/** For each reply marked by `withTransfer`, the buffers to transfer with it. */
-const transferLists = new WeakMap<object, Transferable[]>();
-
-/** Marks arrays of a reply to be transferred to the page instead of copied; they become unusable in the worker. */
-export function withTransfer<Reply extends object>(reply: Reply, arrays: ArrayBufferView[]): Reply {
-  transferLists.set(reply, buffersOf(arrays));
-  return reply;
-}
-
-/** Holds a lock until the worker has ended, so that the page knows when its memory is given back. */
-function hold(lock: string): undefined {
-  void navigator.locks?.request(lock, () => new Promise(() => undefined));
-}
-
-/**
- * Runs the handler for a request of the page when the engine is `ready`, and replies with the handler's result, or with its
- * failure.
- */
-export async function reply(
-  handlers: Record<string, (body: never) => unknown>,
-  { id, kind, body }: { id: number; kind: string; body: unknown },
-  ready?: Promise<unknown>,
-): Promise<void> {
-  const handler = (kind === 'hold' ? hold : handlers[kind]) as (body: unknown) => unknown;
-  try {
-    await ready;
-    const result = await handler(body);
-    const transfer = result instanceof Object ? transferLists.get(result) : undefined;
-    self.postMessage({ id, ok: true, body: result }, { transfer: transfer ?? [] });
-  } catch (error) {
-    self.postMessage({ id, ok: false, failure: toFailure(error) });
-  }
 }

@@ -5,7 +5,6 @@ import { text } from '../texts';
 import { isHeader } from './file-groups';
 import { toNrrd } from './nrrd';
 import type { FileNotes, Intensities, LevelView, NamedBytes, VolumeSource, VolumeView } from './protocol';
-import { Refusal } from './refusal';
 import { release } from './release';
 import { shapeVoxels } from './shapes';
 import { beyondSmall, MOST_BYTES_OF_SMALL } from './small-files';
@@ -15,7 +14,7 @@ import { concerning, type Warning } from './warnings';
 export const HISTOGRAM_BINS = 256;
 
 /**
- * Parses a volume from one file; for a header without its voxels, throws a `Refusal` whose message requests the file
+ * Parses a volume from one file; for a header without its voxels, throws a `VesicleError` whose message requests the file
  * with them.
  */
 function parseFile(file: NamedBytes): VolumeInit {
@@ -23,21 +22,21 @@ function parseFile(file: NamedBytes): VolumeInit {
     return parseVolume(file.bytes);
   } catch (error) {
     if (!(error instanceof VesicleError) || error.code === 'crash' || !isHeader(file)) throw error;
-    throw new Refusal(error.code, text('files.headerWithoutData', { reason: error.message }));
+    throw new VesicleError(error.code, text('files.headerWithoutData', { reason: error.message }));
   }
 }
 
 /**
  * Reads the voxels and the geometry of a volume from one file, or from a header and its data in either order; throws a
- * `Refusal` for any other number of files.
+ * `VesicleError` for any other number of files.
  */
 export async function readFiles(files: NamedBytes[]): Promise<VolumeInit> {
   await startReaders();
   const [first, second] = files;
-  if (!first) throw new Refusal('bad-file', text('files.noFile'));
+  if (!first) throw new VesicleError('bad-file', text('files.noFile'));
   if (!second) return withNotes(parseFile(first), first.notes);
   const header = files.find(isHeader);
-  if (!header) throw new Refusal('bad-file', text('files.notOneVolume', { count: files.length }));
+  if (!header) throw new VesicleError('bad-file', text('files.notOneVolume', { count: files.length }));
   const others = files.filter((file) => file !== header);
   // A single data file may have another name than its header says.
   if (files.length === 2) return parseVolume(header.bytes, { data: (header === first ? second : first).bytes });
@@ -68,16 +67,16 @@ export interface OpenFrame {
 /** Most pixels of a plane through an image in small files: views of larger ones hold the page for seconds. */
 const MOST_PIXELS_OF_SMALL = 2 ** 22;
 
-/** Throws a `Refusal` if planes through an image in small files have too many pixels to be shown. */
+/** Throws a `VesicleError` if planes through an image in small files have too many pixels to be shown. */
 export function checkPlanes({ dims }: Pick<Volume, 'dims'>): void {
   const [, middle = 1, longest = 1] = [...dims].sort((a, b) => a - b);
   const pixels = middle * longest;
   if (pixels <= MOST_PIXELS_OF_SMALL) return;
-  throw new Refusal('too-large', beyondSmall('files.planesTooLarge', pixels, MOST_PIXELS_OF_SMALL));
+  throw new VesicleError('too-large', beyondSmall('files.planesTooLarge', pixels, MOST_PIXELS_OF_SMALL));
 }
 
 /**
- * Throws a `Refusal` if an image in small files has planes with too many pixels, or too many bytes of voxels, to be shown;
+ * Throws a `VesicleError` if an image in small files has planes with too many pixels, or too many bytes of voxels, to be shown;
  * these are given back.
  */
 export function checkSmallImage({ dims: [x, y, z, frames = 1], data }: Pick<VolumeInit, 'dims' | 'data'>): void {
@@ -86,7 +85,7 @@ export function checkSmallImage({ dims: [x, y, z, frames = 1], data }: Pick<Volu
   const [voxels, most] = [x * y * z * frames, MOST_BYTES_OF_SMALL / bytes];
   if (voxels <= most) return;
   release(data);
-  throw new Refusal('too-large', beyondSmall('files.tooManyVoxels', voxels, most, { bits: 8 * bytes }));
+  throw new VesicleError('too-large', beyondSmall('files.tooManyVoxels', voxels, most, { bits: 8 * bytes }));
 }
 
 /**
@@ -98,7 +97,7 @@ export async function openFrame(source: VolumeSource, frame: number, isSmall = f
   if (isSmall) checkSmallImage(init);
   const [x, y, z, frames = 1] = init.dims;
   if (!Number.isInteger(frame) || frame < 0 || frame >= frames)
-    throw new Refusal('invalid-argument', text('slices.noFrame', { last: frames - 1, frame }));
+    throw new VesicleError('invalid-argument', text('slices.noFrame', { last: frames - 1, frame }));
   const size = x * y * z;
   const data = init.data.subarray(frame * size, (frame + 1) * size);
   const own = concerning(warnings, { frame }).map((warning) => withoutFrame(warning));

@@ -1,4 +1,4 @@
-import { RequestError } from '../engine/channel';
+import { RequestError } from '../engine/failure';
 import type { ExportRequest } from '../engine/protocol';
 import { text } from '../texts';
 import { connectFinish, type FinishClient } from './client';

@@ -1,8 +1,9 @@
 /** The size that edits of a session may give a surface, since a small file may come from anyone. */
+
 import type { Mesh } from 'vesicle';
+import { VesicleError } from 'vesicle/channel';
 import { callOf } from '../engine/edits';
 import type { Edit } from '../engine/protocol';
-import { Refusal } from '../engine/refusal';
 import { count } from '../kit/format';
 import { text } from '../texts';
 
@@ -15,13 +16,13 @@ export const MOST_OF_SMALL = 200_000;
  */
 const VERTICES_PER_AREA = 1.39;
 
-/** Throws a {@link Refusal} if an edit would give a mesh more than about `most` vertices. Only remeshing adds many. */
+/** Throws a {@link VesicleError} if an edit would give a mesh more than about `most` vertices. Only remeshing adds many. */
 export function checkSize(mesh: Mesh, edit: Edit, most: number): void {
   if (edit.op !== 'remesh' || !(edit.min > 0)) return;
   const vertices = remeshedVertices(mesh, edit);
   if (vertices <= most) return;
   const shown = { edit: callOf(edit), vertices: count(Math.round(vertices)), most: count(most) };
-  throw new Refusal('too-large', text('finish.tooLarge', shown));
+  throw new VesicleError('too-large', text('finish.tooLarge', shown));
 }
 
 /** Estimates the vertices of a mesh after it is remeshed, from its area and, as needles have hardly any, the splits of edges. */

@@ -1,16 +1,17 @@
 /** Worker that edits a surface after a run, and compares it with a reference. */
+
 import init, { Mesh, Volume } from 'vesicle';
+import { VesicleError, withTransfer } from 'vesicle/channel';
 import { apply } from '../engine/edits';
 import { withoutCompression } from '../engine/gltf';
 import { relativeTo } from '../engine/placing';
 import type { Edit, NamedBytes, SurfacePoint } from '../engine/protocol';
-import { Refusal } from '../engine/refusal';
-import { type Handlers, reply, withTransfer } from '../engine/serving';
+import { type Handlers, serveWhenReady } from '../engine/serving';
 import { copySurface, emptyArrays, sectionOf } from '../engine/surface-buffers';
 import { readFiles } from '../engine/volumes';
 import { text } from '../texts';
 import { distancesBetween, gridAround } from './distances';
-import type { Comparison, Edited, RequestKind, Requests } from './protocol';
+import type { Comparison, Edited, Requests } from './protocol';
 import { checkSize } from './size';
 
 /** Number of triangles in all surfaces that are kept for undo. */
@@ -25,7 +26,7 @@ let reference: Mesh | Volume | undefined;
 
 function current(): { mesh: Mesh; log: Edit[] } {
   const state = states[present];
-  if (!state) throw new Refusal('page', text('finish.noSurface'));
+  if (!state) throw new VesicleError('invalid-argument', text('finish.noSurface'));
   return state;
 }
 
@@ -122,7 +123,7 @@ async function readReference(files: NamedBytes[]): Promise<undefined> {
 }
 
 function compare({ label }: { label?: number }): Comparison {
-  if (!reference) throw new Refusal('page', text('finish.noReference'));
+  if (!reference) throw new VesicleError('invalid-argument', text('finish.noReference'));
   const { mesh } = current();
   if (reference instanceof Mesh) {
     const grid = reference.check().closed ? gridAround(mesh, reference) : undefined;
@@ -167,8 +168,4 @@ const handlers: Handlers<Requests> = {
   compare,
 };
 
-const started = init();
-started.catch(() => undefined);
-
-self.onmessage = ({ data }: MessageEvent<{ id: number; kind: RequestKind; body: unknown }>) =>
-  void reply(handlers, data, started);
+serveWhenReady<Requests>(init(), handlers);

@@ -1,11 +1,12 @@
 /** Worker that reads formats of other programs (DICOM, TIFF) and writes them as files that all labs read. */
+
 import init, { Volume, type VolumeInit } from 'vesicle';
+import { send, VesicleError, withTransfer } from 'vesicle/channel';
 import { type Decoders, type DicomVolume, openDicom } from 'vesicle/dicom';
 import { openTiff } from 'vesicle/tiff';
 import { type Label, newLabel } from '../engine/labels';
 import type { FileNotes, NamedBytes } from '../engine/protocol';
-import { Refusal } from '../engine/refusal';
-import { reply, withTransfer } from '../engine/serving';
+import { type Handlers, serve } from '../engine/serving';
 import { withLabels } from '../engine/slicer';
 import { text } from '../texts';
 import type { Candidate, Listing, ProgressEvent, Requests } from './protocol';
@@ -44,7 +45,7 @@ function pageAddress(): string {
 const tell =
   (stage: ProgressEvent['stage']) =>
   ({ done, total }: { done: number; total: number }) =>
-    self.postMessage({ event: 'progress', stage, done, total } satisfies ProgressEvent);
+    send<ProgressEvent>({ event: 'progress', stage, done, total });
 
 async function list({ files }: { files: File[] }): Promise<Listing> {
   const heads = await Promise.all(files.map(async (file) => new Uint8Array(await file.slice(0, HEAD).arrayBuffer())));
@@ -56,7 +57,7 @@ async function list({ files }: { files: File[] }): Promise<Listing> {
 async function listTiff(files: File[]): Promise<Found> {
   const stack = await openTiff(files);
   const { dims, spacing, frames, unit = '', warnings, remarks, channels } = stack;
-  if (dims[2] === 1) throw new Refusal('bad-file', text('files.singleSlice', { format: 'TIFF' }));
+  if (dims[2] === 1) throw new VesicleError('bad-file', text('files.singleSlice', { format: 'TIFF' }));
   const stem = files[0]?.name.replace(/(\.ome)?\.tiff?$/i, '') ?? '';
   const known = { kind: 'image', patient: '', modality: '', date: '', uneven: undefined, remarks: [] } as const;
   const candidates = channels.map(({ name }, channel): Listed => {
@@ -120,7 +121,7 @@ async function read({ ids, resample }: Requests['read']['body']): Promise<NamedB
   const files: NamedBytes[] = [];
   for (const id of ids) {
     const volume = listed[id];
-    if (!volume) throw new Refusal('page', text('importing.noVolume'));
+    if (!volume) throw new VesicleError('invalid-argument', text('importing.noVolume'));
     files.push(await volume.read(resample));
   }
   return withTransfer(
@@ -153,4 +154,4 @@ function written(name: string, init: VolumeInit, known: Omit<FileNotes, 'warning
   }
 }
 
-self.onmessage = ({ data }) => void reply({ list, read }, data);
+serve({ list, read } satisfies Handlers<Requests>);

@@ -1,4 +1,4 @@
-import { toFailure } from '../engine/channel';
+import { toFailure } from '../engine/failure';
 import type { Failure, NamedBytes, ParamSpec, Unit } from '../engine/protocol';
 import type { Warning } from '../engine/warnings';
 import type { ErrorBanner, StatusLine } from '../kit/status';

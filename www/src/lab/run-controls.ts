@@ -1,4 +1,4 @@
-import { toFailure } from '../engine/channel';
+import { toFailure } from '../engine/failure';
 import type { ExportRequest, Unit } from '../engine/protocol';
 import type { Warning } from '../engine/warnings';
 import { Finish } from '../finish';

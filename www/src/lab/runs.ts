@@ -1,4 +1,4 @@
-import { RequestError } from '../engine/channel';
+import { RequestError } from '../engine/failure';
 import type { CodeRequest, CodeRequests, FailureEvent, Measures, RunCode, StateEvent } from '../engine/protocol';
 import { labShortcuts, type Shortcut } from '../kit/shortcuts';
 import { plural, text } from '../texts';

@@ -1,4 +1,4 @@
-import { toFailure } from '../engine/channel';
+import { toFailure } from '../engine/failure';
 import { type LabState, Observable } from '../kit/state';
 import type { ErrorBanner, StatusLine } from '../kit/status';
 import { text } from '../texts';

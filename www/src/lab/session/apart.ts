@@ -1,25 +1,20 @@
 /** Reads sessions in a worker of their own, so that the page answers meanwhile. */
+import { Channel } from 'vesicle/channel';
 import { LANGUAGE } from '../../texts';
 import type { Session } from './check';
-import type { Reply } from './protocol';
+import type { Requests } from './protocol';
 
 /**
  * Does what `readSession` does, in a worker that `spawn` starts; `bytes` are transferred to it. Its name is the language of its
  * messages.
  */
 export async function readApart(bytes: Uint8Array, spawn: (name: string) => Worker): Promise<Session> {
-  const worker = spawn(LANGUAGE);
+  const channel = await new Promise<Channel<Requests, 'ready'>>((resolve, reject) => {
+    const opened = new Channel<Requests, 'ready'>(spawn(LANGUAGE), { onEvent: () => resolve(opened), onEnd: reject });
+  });
   try {
-    const reply = await new Promise<Exclude<Reply, 'ready'>>((resolve, reject) => {
-      worker.onmessage = ({ data }: MessageEvent<Reply>) => {
-        if (data === 'ready') worker.postMessage(bytes, [bytes.buffer]);
-        else resolve(data);
-      };
-      worker.onerror = ({ message }) => reject(new Error(message));
-    });
-    if ('session' in reply) return reply.session;
-    throw new Error(reply.message);
+    return await channel.request('read', bytes, { transfer: [bytes.buffer] });
   } finally {
-    worker.terminate();
+    channel.end(new Error('the session was read'));
   }
 }

@@ -1,4 +1,6 @@
-/** Messages of the worker that reads sessions: first that it listens, since its texts may have to be fetched. */
+/** Requests to the worker that reads sessions. It first sends an event, since its texts may have to be fetched. */
 import type { Session } from './check';
 
-export type Reply = 'ready' | { session: Session } | { message: string };
+export interface Requests {
+  read: { body: Uint8Array; reply: Session };
+}

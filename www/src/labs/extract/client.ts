@@ -1,7 +1,5 @@
-import { Channel } from '../../engine/channel';
+import { EngineChannel } from '../../engine/channel';
 import type { Requests, ReturnMessage, WorkerEvent } from './protocol';
-
-export { RequestError, toFailure } from '../../engine/channel';
 
 /** Starts the Extract lab's worker. */
 export const spawnExtract = () =>
@@ -9,6 +7,6 @@ export const spawnExtract = () =>
 
 /** Connects the page to that worker. */
 export const connectExtract = (onEvent: (event: WorkerEvent) => void) =>
-  new Channel<Requests, WorkerEvent, ReturnMessage>(spawnExtract, onEvent);
+  new EngineChannel<Requests, WorkerEvent, ReturnMessage>(spawnExtract, onEvent);
 
 export type ExtractClient = ReturnType<typeof connectExtract>;

@@ -1,3 +1,4 @@
+import { toFailure } from '../../engine/failure';
 import type { VertexQuantity } from '../../engine/protocol';
 import { History } from '../../kit/history';
 import type { LabState } from '../../kit/state';
@@ -7,7 +8,7 @@ import { type RunningLab, Runs } from '../../lab/runs';
 import { LabShell } from '../../lab/shell';
 import { LabStates } from '../../lab/states';
 import { text } from '../../texts';
-import { connectExtract, toFailure } from './client';
+import { connectExtract } from './client';
 import { ExtractData, type ExtractOpening, type ExtractSource, fetchLinked, frameOf } from './data';
 import type { Example } from './examples';
 import { linkOf, MOST_ATTRACTORS, toHash } from './link';

@@ -2,10 +2,10 @@
  * Opens volumes larger than memory in the Extract lab's worker. They need the whole library, whose models can read
  * parts of a volume: this file is loaded when the first one is opened.
  */
+import { VesicleError } from 'vesicle/channel';
 import init, { DeformableModel, type Volume } from 'vesicle/index';
 import { openZarr, type ZarrVolume } from 'vesicle/zarr';
 import type { VolumeView } from '../../engine/protocol';
-import { Refusal } from '../../engine/refusal';
 import { areSmall, CACHE_OF_SMALL } from '../../engine/small-files';
 import { viewOf } from '../../engine/volumes';
 import { text } from '../../texts';
@@ -34,7 +34,7 @@ export class LargeVolume {
       const last = image.levels.length - 1;
       const max = image.levels[last]?.dims ?? [0, 0, 0];
       // Opening has not read a coarsest level that is too large.
-      if (!image.range) throw new Refusal('too-large', text('extract.largeCoarsest', { dims: max.join(' × ') }));
+      if (!image.range) throw new VesicleError('too-large', text('extract.largeCoarsest', { dims: max.join(' × ') }));
       return new LargeVolume(image, await image.region(last, { min: [0, 0, 0], max }, { signal }));
     } catch (error) {
       image.free();
@@ -56,7 +56,8 @@ export class LargeVolume {
   /** Builds a model that starts on the coarsest level, and ends as many levels below as the set-up says. */
   model(setup: Setup, isSmall?: boolean): DeformableModel {
     const coarser = this.coarserLevels;
-    if (setup.levels > coarser) throw new Refusal('invalid-argument', text('extract.largeLevels', { most: coarser }));
+    if (setup.levels > coarser)
+      throw new VesicleError('invalid-argument', text('extract.largeLevels', { most: coarser }));
     const { levels, ...options } = modelOptions(this.#coarsest, setup, isSmall);
     const image = { volume: this.#image, finest: coarser - levels, ...(setup.box && { box: setup.box }) };
     return withAttractors(setup, () => new DeformableModel({ ...options, ...image }));

@@ -1,10 +1,11 @@
+import { toFailure } from '../../engine/failure';
 import type { Attractor, ParamValues, VolumeView } from '../../engine/protocol';
 import type { HistoryMark } from '../../kit/history';
 import type { Moments } from '../../lab/session/moments';
 import type { LabStates } from '../../lab/states';
 import { type SavedMoment, UndoHistory } from '../../lab/undo-history';
 import { plural, text } from '../../texts';
-import { type ExtractClient, toFailure } from './client';
+import type { ExtractClient } from './client';
 import type { StartChoice } from './panels/start';
 import type { ExtractParts } from './parts';
 import type { Preset, Variant } from './presets';

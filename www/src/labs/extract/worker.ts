@@ -1,7 +1,9 @@
 /** Worker of the Extract lab: holds one volume and one model, and serves the page's requests. */
 
 import type { DeformableModel, Mesh, StepReport, Volume } from 'vesicle';
+import { send as post, VesicleError, withTransfer } from 'vesicle/channel';
 import { toCode } from '../../engine/code';
+import { workerFailure } from '../../engine/failure';
 import { labelsLike } from '../../engine/likeness';
 import { release } from '../../engine/memory';
 import type {
@@ -18,9 +20,8 @@ import type {
   VertexQuantity,
   VolumeView,
 } from '../../engine/protocol';
-import { Refusal, toFailure } from '../../engine/refusal';
 import { logged, RunRecorder } from '../../engine/run-log';
-import { buffersOf, type Handlers, sender, serve, Work, withTransfer } from '../../engine/serving';
+import { buffersOf, type Handlers, serveLab, Work } from '../../engine/serving';
 import { copySurface, emptyArrays, sectionOf, transferOf } from '../../engine/surface-buffers';
 import { checkPlanes, displayOf, levelsOf, openFrame, viewOf } from '../../engine/volumes';
 import { text } from '../../texts';
@@ -70,7 +71,7 @@ interface Image {
   isSmall: boolean;
 }
 
-const send = sender<WorkerEvent>();
+const send = post<WorkerEvent>;
 
 class Session {
   /** The open volume; of one larger than memory, `#large`, only parts are read. */
@@ -218,14 +219,14 @@ class Session {
   }
 
   #current(): DeformableModel {
-    if (!this.#model) throw new Refusal('invalid-argument', text('extract.noVolume'));
+    if (!this.#model) throw new VesicleError('invalid-argument', text('extract.noVolume'));
     return this.#model;
   }
 
   /** Returns the open volume, for what needs all of it. */
   #image(): Volume {
     if (!this.#volume)
-      throw new Refusal('invalid-argument', text(this.#large ? 'extract.tooLargeForThis' : 'extract.noVolume'));
+      throw new VesicleError('invalid-argument', text(this.#large ? 'extract.tooLargeForThis' : 'extract.noVolume'));
     return this.#volume;
   }
 
@@ -250,7 +251,7 @@ class Session {
         onData: (data) => this.#received(data),
       });
     } catch (error) {
-      if (!signal.aborted) failure = toFailure(error);
+      if (!signal.aborted) failure = workerFailure(error);
     }
     // Nothing is read any more, whatever was to come.
     if (this.#data) send({ event: 'data', ...this.#data, waiting: 0 });
@@ -468,4 +469,4 @@ class Session {
 }
 
 const session = new Session();
-serve('deformable', session.handlers, ({ buffers }: ReturnMessage) => session.takeBack(buffers));
+serveLab('deformable', session.handlers, ({ buffers }: ReturnMessage) => session.takeBack(buffers));

@@ -1,4 +1,4 @@
-import { Channel } from '../../engine/channel';
+import { EngineChannel } from '../../engine/channel';
 import type { Requests, ShownMessage, WorkerEvent } from './protocol';
 
 /**
@@ -10,6 +10,6 @@ export const spawnReconstruct = () =>
 
 /** Connects the page to that worker. */
 export const connectReconstruct = (onEvent: (event: WorkerEvent) => void) =>
-  new Channel<Requests, WorkerEvent, ShownMessage>(spawnReconstruct, onEvent);
+  new EngineChannel<Requests, WorkerEvent, ShownMessage>(spawnReconstruct, onEvent);
 
 export type ReconstructClient = ReturnType<typeof connectReconstruct>;

@@ -1,8 +1,9 @@
 /** Code of the Reconstruct lab's runs. */
+
 import type { ImplicitChoice } from 'vesicle';
+import { VesicleError } from 'vesicle/channel';
 import { bytesOf, callsOf, chosen, type Program } from '../../engine/code';
 import { literal } from '../../engine/literal';
-import { Refusal } from '../../engine/refusal';
 import { text } from '../../texts';
 import { toPointEdits } from './model';
 import type { CameraView, Edits, PointArray, Setup } from './protocol';
@@ -50,7 +51,7 @@ function remarkOn({ noise, delta, lambdaSurface, lambdaExterior, sides }: Implic
 
 /** Returns computed points as text, three coordinates a line; refuses if they are of a file, which the code reads. */
 export function pointsFile(file: string | undefined, points: PointArray): Uint8Array {
-  if (file !== undefined) throw new Refusal('invalid-argument', text('sessions.noDataNeeded'));
+  if (file !== undefined) throw new VesicleError('invalid-argument', text('sessions.noDataNeeded'));
   const lines = Array.from({ length: points.length / 3 }, (_, i) => points.subarray(3 * i, 3 * i + 3).join(' '));
   return new TextEncoder().encode(`${lines.join('\n')}\n`);
 }

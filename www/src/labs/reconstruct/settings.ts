@@ -1,4 +1,4 @@
-import { toFailure } from '../../engine/channel';
+import { toFailure } from '../../engine/failure';
 import type { LabStates } from '../../lab/states';
 import { UndoStack } from '../../lab/undo';
 import { text } from '../../texts';

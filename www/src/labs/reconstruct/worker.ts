@@ -1,11 +1,12 @@
 /** Worker of the Reconstruct lab: holds points, cameras and one model of them, and serves the page's requests. */
 
 import type { ImplicitSurface, StepReport } from 'vesicle';
+import { send as post, VesicleError } from 'vesicle/channel';
 import { toCode } from '../../engine/code';
+import { workerFailure } from '../../engine/failure';
 import type { Surface } from '../../engine/protocol';
-import { Refusal, toFailure } from '../../engine/refusal';
 import { logged, RunRecorder } from '../../engine/run-log';
-import { buffersOf, type Handlers, sender, serve, Work } from '../../engine/serving';
+import { buffersOf, type Handlers, serveLab, Work } from '../../engine/serving';
 import { copySurface, emptyArrays, transferOf } from '../../engine/surface-buffers';
 import { fileOf } from '../../engine/volumes';
 import { text } from '../../texts';
@@ -41,7 +42,7 @@ const PREVIEW_EVERY = 100;
 /** Least milliseconds between two progress events during a run. */
 const REPORT_EVERY = 50;
 
-const send = sender<WorkerEvent>();
+const send = post<WorkerEvent>;
 
 class Session {
   #cloud: Cloud | undefined;
@@ -138,7 +139,7 @@ class Session {
   }
 
   #points(): Cloud {
-    if (!this.#cloud) throw new Refusal('invalid-argument', text('reconstruct.noPoints'));
+    if (!this.#cloud) throw new VesicleError('invalid-argument', text('reconstruct.noPoints'));
     return this.#cloud;
   }
 
@@ -148,7 +149,7 @@ class Session {
   }
 
   #current(): ImplicitSurface {
-    if (!this.#model) throw new Refusal('invalid-argument', text('reconstruct.noPoints'));
+    if (!this.#model) throw new VesicleError('invalid-argument', text('reconstruct.noPoints'));
     return this.#model;
   }
 
@@ -165,7 +166,7 @@ class Session {
       await model.run({ signal, onStep: (report) => this.#stepped(report) });
     } catch (error) {
       // After the state event, so that the page shows the failure on top of that state.
-      if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
+      if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: workerFailure(error) }));
     }
     this.#reportStopped();
   }
@@ -301,4 +302,4 @@ class Session {
 }
 
 const session = new Session();
-serve('implicit', session.handlers, () => session.shown());
+serveLab('implicit', session.handlers, () => session.shown());

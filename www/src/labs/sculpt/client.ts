@@ -1,4 +1,4 @@
-import { Channel } from '../../engine/channel';
+import { EngineChannel } from '../../engine/channel';
 import type { PoseMessage, Requests, ShownMessage, WorkerEvent } from './protocol';
 
 /**
@@ -9,6 +9,6 @@ export const spawnSculpt = () =>
 
 /** Connects the page to that worker. */
 export const connectSculpt = (onEvent: (event: WorkerEvent) => void) =>
-  new Channel<Requests, WorkerEvent, PoseMessage | ShownMessage>(spawnSculpt, onEvent);
+  new EngineChannel<Requests, WorkerEvent, PoseMessage | ShownMessage>(spawnSculpt, onEvent);
 
 export type SculptClient = ReturnType<typeof connectSculpt>;

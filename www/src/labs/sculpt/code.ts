@@ -1,8 +1,8 @@
 /** Code of the Sculpt lab's runs. */
+import { VesicleError } from 'vesicle/channel';
 import { isCompressedGltf } from 'vesicle/gltf';
 import { bytesOf, callsOf, chosen, type Program } from '../../engine/code';
 import { literal } from '../../engine/literal';
-import { Refusal } from '../../engine/refusal';
 import { text } from '../../texts';
 import type { MeshSource, PoseLog, SceneSource } from './protocol';
 import { BALL, type ComputedMesh, globeAsObj } from './shapes';
@@ -78,5 +78,5 @@ const isGlobe = (origin: object) => 'shape' in origin && !isBall(origin);
 /** Returns the mesh that code reads if it is a computed one, as a file. */
 export function meshFile(origins: Origins): Uint8Array {
   if (Object.values(origins).some(isGlobe)) return globeAsObj();
-  throw new Refusal('invalid-argument', text('sessions.noDataNeeded'));
+  throw new VesicleError('invalid-argument', text('sessions.noDataNeeded'));
 }

@@ -1,10 +1,11 @@
 /** Worker of the Sculpt lab: holds the meshes and one model of them, and serves the page's requests. */
 
 import type { StepReport } from 'vesicle';
+import { send as post, VesicleError } from 'vesicle/channel';
 import { toCode } from '../../engine/code';
-import { Refusal, toFailure } from '../../engine/refusal';
+import { workerFailure } from '../../engine/failure';
 import { logged, RunRecorder } from '../../engine/run-log';
-import { type Handlers, sender, serve, Work } from '../../engine/serving';
+import { type Handlers, serveLab, Work } from '../../engine/serving';
 import { transferOf } from '../../engine/surface-buffers';
 import { text } from '../../texts';
 import { meshFile, type Origins, originsOf, programOf } from './code';
@@ -45,7 +46,7 @@ import { TargetPath } from './target-path';
 const MOST_LOGS = 200;
 
 type Model = ReturnType<typeof buildModel>;
-const send = sender<WorkerEvent>();
+const send = post<WorkerEvent>;
 
 class Session {
   #scene: Scene = { detail: undefined, base: undefined };
@@ -113,7 +114,7 @@ class Session {
       if (dragging) this.#path.jumpTo(this.#model, pose);
       else this.#path.glideTo(this.#model, pose);
     } catch (error) {
-      send({ event: 'refused', failure: toFailure(error), pose: this.#path.finalTarget(this.#model) });
+      send({ event: 'refused', failure: workerFailure(error), pose: this.#path.finalTarget(this.#model) });
     }
     this.#poseId = poseId;
     this.#dragging = dragging;
@@ -179,7 +180,7 @@ class Session {
   }
 
   #current(): Model {
-    if (!this.#model) throw new Refusal('invalid-argument', text('sculpt.noMesh'));
+    if (!this.#model) throw new VesicleError('invalid-argument', text('sculpt.noMesh'));
     return this.#model;
   }
 
@@ -208,7 +209,7 @@ class Session {
       await this.#frames(signal);
     } catch (error) {
       // After the state event, so that the page shows the failure on top of that state.
-      queueMicrotask(() => send({ event: 'failure', failure: toFailure(error) }));
+      queueMicrotask(() => send({ event: 'failure', failure: workerFailure(error) }));
     }
     this.#path.stop();
     this.#standStill();
@@ -337,7 +338,7 @@ class Session {
     await this.#recording.stop();
     const model = this.#current();
     const { film } = this.#path;
-    if (!film) throw new Refusal('invalid-argument', text('sculpt.noFilm'));
+    if (!film) throw new VesicleError('invalid-argument', text('sculpt.noFilm'));
     const before = model.save();
     const { log } = this.#log;
     const tell = (progress: number) => send({ event: 'recorded', progress });
@@ -379,7 +380,7 @@ class Session {
 }
 
 const session = new Session();
-serve('multires', session.handlers, (message: ShownMessage | PoseMessage) => {
+serveLab('multires', session.handlers, (message: ShownMessage | PoseMessage) => {
   if (message.kind === 'shown') session.shown(message);
   else session.pose(message);
 });

@@ -1,4 +1,4 @@
-import { Channel } from '../../engine/channel';
+import { EngineChannel } from '../../engine/channel';
 import type { Requests, WorkerEvent } from './protocol';
 
 /**
@@ -10,6 +10,6 @@ export const spawnSegment = () =>
 
 /** Connects the page to that worker. */
 export const connectSegment = (onEvent: (event: WorkerEvent) => void) =>
-  new Channel<Requests, WorkerEvent>(spawnSegment, onEvent);
+  new EngineChannel<Requests, WorkerEvent>(spawnSegment, onEvent);
 
 export type SegmentClient = ReturnType<typeof connectSegment>;

@@ -1,4 +1,4 @@
-import { RequestError, toFailure } from '../../engine/channel';
+import { RequestError, toFailure } from '../../engine/failure';
 import { rgbOf } from '../../engine/labels';
 import { release } from '../../engine/release';
 import { nameOf, readFiles } from '../../importers/files';

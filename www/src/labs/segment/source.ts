@@ -1,11 +1,11 @@
 /** Opens volumes and label maps. Used by the worker only. */
 
 import { type LengthUnit, Volume, type VolumeInit } from 'vesicle';
+import { VesicleError } from 'vesicle/channel';
 import { groupFiles } from '../../engine/file-groups';
 import type { KnownLabel, LabelArray } from '../../engine/labels';
 import { labelsLike } from '../../engine/likeness';
 import type { Intensities } from '../../engine/protocol';
-import { Refusal } from '../../engine/refusal';
 import { labelsIn } from '../../engine/slicer';
 import { tooManyLabels } from '../../engine/small-files';
 import { checkSmallImage, displayed, readFiles } from '../../engine/volumes';
@@ -71,7 +71,7 @@ export async function openImage({ files, labelling }: ImageSource, isSmall = fal
 export async function openLabels(files: NamedBytes[], volume: Volume, isSmall: boolean): Promise<OpenMap> {
   const groups = groupFiles(files);
   const [first] = groups;
-  if (!first || groups.length !== 1) throw new Refusal('bad-file', text('segment.oneLabelMap'));
+  if (!first || groups.length !== 1) throw new VesicleError('bad-file', text('segment.oneLabelMap'));
   return labelsOf(await readMap(first), volume, { isBoth: false, isSmall });
 }
 
@@ -101,9 +101,9 @@ interface Both extends Pick<OpenVolume, 'looksLike'> {
 /** Reads the volume and, if the files contain two, the label map; one that names its labels, or looks like a map, is both. */
 async function readBoth(files: NamedBytes[]): Promise<Both> {
   const groups = groupFiles(files);
-  if (groups.length > 2) throw new Refusal('bad-file', text('segment.atMostTwo', { count: groups.length }));
+  if (groups.length > 2) throw new VesicleError('bad-file', text('segment.atMostTwo', { count: groups.length }));
   const [first, second] = await Promise.all(groups.map(readMap));
-  if (!first) throw new Refusal('bad-file', text('files.noFile'));
+  if (!first) throw new VesicleError('bad-file', text('files.noFile'));
   if (!second) return alone(first);
   const [map, image] = isMap(first, second) ? [first, second] : [second, first];
   return { image, map, looksLike: 0 };
@@ -172,8 +172,9 @@ function labelsOf(
     // Those that are described are listed, too.
     const labels = new Set([...map.labels(), ...known].map(({ value }) => value)).size;
     const refusal = isSmall && tooManyLabels(labels);
-    if (refusal) throw new Refusal('too-large', refusal);
-    if (labels > MOST_OPENED) throw new Refusal('too-large', text('segment.tooMany', { labels, most: MOST_OPENED }));
+    if (refusal) throw new VesicleError('too-large', refusal);
+    if (labels > MOST_OPENED)
+      throw new VesicleError('too-large', text('segment.tooMany', { labels, most: MOST_OPENED }));
     const count = map.dims.reduce((product, size) => product * size, 1);
     const isPlain = (init.slope ?? 1) === 1 && (init.intercept ?? 0) === 0;
     const voxels = isPlain ? (init.data.slice(0, count) as LabelArray) : Int32Array.from(map.intensities());
@@ -209,7 +210,7 @@ function placed(map: Volume, labels: LabelArray, volume: Volume): LabelArray {
     const at = map.dims.map((size, axis) => ((corner >> axis) & 1) * (size - 1)) as Vec3;
     const exact = indexOf(at);
     if (target(at).some((x, axis) => !(Math.abs(x - (exact[axis] ?? 0)) <= SNAP)) || !isPermutation(steps))
-      throw new Refusal('invalid-argument', text('segment.otherGrid'));
+      throw new VesicleError('invalid-argument', text('segment.otherGrid'));
   }
   return copied(labels, map.dims, volume.dims, target);
 }
@@ -229,7 +230,7 @@ function copied(labels: LabelArray, dims: Vec3, larger: Vec3, target: (at: Vec3)
     const row = Math.floor(i / dims[0]);
     const at = target([i - row * dims[0], row % dims[1], Math.floor(row / dims[1])]);
     if (at.some((x, axis) => x < 0 || x >= (larger[axis] ?? 0)))
-      throw new Refusal('invalid-argument', text('segment.outside'));
+      throw new VesicleError('invalid-argument', text('segment.outside'));
     out[(at[2] * larger[1] + at[1]) * larger[0] + at[0]] = label;
   }
   return out;
@@ -238,12 +239,12 @@ function copied(labels: LabelArray, dims: Vec3, larger: Vec3, target: (at: Vec3)
 function requireSameGrid(map: Volume, volume: Volume): void {
   const sizes = ({ dims }: Volume) => dims.join(' × ');
   if (sizes(map) !== sizes(volume))
-    throw new Refusal('invalid-argument', text('segment.otherSize', { map: sizes(map), volume: sizes(volume) }));
+    throw new VesicleError('invalid-argument', text('segment.otherSize', { map: sizes(map), volume: sizes(volume) }));
   const unit = Math.min(...volume.spacing);
   const [ours, theirs] = [corners(volume), corners(map)];
   const off = Math.max(...ours.map((x, i) => Math.abs(x - (theirs[i] ?? 0)))) / unit;
   if (off > TOLERANCE)
-    throw new Refusal('invalid-argument', text('segment.otherPosition', { voxels: off.toPrecision(2) }));
+    throw new VesicleError('invalid-argument', text('segment.otherPosition', { voxels: off.toPrecision(2) }));
 }
 
 /** Returns the positions of the eight corners of a grid in RAS space, packed xyz. */

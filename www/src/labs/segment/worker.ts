@@ -1,10 +1,10 @@
 /** Worker of the Segment lab: holds one volume, its label map and their surfaces, and serves the page's requests. */
 
 import { LabelSurfaces, type Volume } from 'vesicle';
+import { VesicleError, withTransfer } from 'vesicle/channel';
 import type { LabelArray } from '../../engine/labels';
 import { quantize } from '../../engine/quantize';
-import { Refusal } from '../../engine/refusal';
-import { type Handlers, serve, withTransfer } from '../../engine/serving';
+import { type Handlers, serveLab } from '../../engine/serving';
 import { withLabels } from '../../engine/slicer';
 import { areSmall, SEGMENT_OF_SMALL, tooManyLabels } from '../../engine/small-files';
 import { capacityFor } from '../../engine/surface-buffers';
@@ -58,7 +58,7 @@ class LiveMap {
     this.#voxelVolume = Math.abs(determinant(image.volume.affine));
     try {
       const refusal = isSmall && tooManyLabels(this.map.labels().length);
-      if (refusal) throw new Refusal('too-large', refusal);
+      if (refusal) throw new VesicleError('too-large', refusal);
       this.surfaces = new LabelSurfaces({ volume: this.map, ...params, ...(isSmall && SEGMENT_OF_SMALL) });
       if (state) this.surfaces.restore(state);
     } catch (error) {
@@ -165,7 +165,7 @@ class Session {
     mask: ({ low, high }) => this.#mask(low, high),
     exportMap: ({ format, labels }) => {
       const { map } = this.#current();
-      if (format === 'nifti' && !fitsNifti(map)) throw new Refusal('precision', text('segment.tooFarForNifti'));
+      if (format === 'nifti' && !fitsNifti(map)) throw new VesicleError('precision', text('segment.tooFarForNifti'));
       const file = map.toBytes(format, { gzip: true });
       return format === 'nrrd' ? withLabels(file, labels, map.dims) : file;
     },
@@ -250,12 +250,12 @@ class Session {
   }
 
   #image(): Pick<OpenVolume, 'volume' | 'unit'> {
-    if (!this.#open) throw new Refusal('invalid-argument', text('segment.noVolume'));
+    if (!this.#open) throw new VesicleError('invalid-argument', text('segment.noVolume'));
     return this.#open;
   }
 
   #current(): LiveMap {
-    if (!this.#live) throw new Refusal('invalid-argument', text('segment.noVolume'));
+    if (!this.#live) throw new VesicleError('invalid-argument', text('segment.noVolume'));
     return this.#live;
   }
 }
@@ -281,4 +281,4 @@ function determinant(affine: ArrayLike<number>): number {
   );
 }
 
-serve('labels', new Session().handlers);
+serveLab('labels', new Session().handlers);

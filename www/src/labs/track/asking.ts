@@ -1,4 +1,4 @@
-import { toFailure } from '../../engine/channel';
+import { toFailure } from '../../engine/failure';
 import type { LabStates } from '../../lab/states';
 import { text } from '../../texts';
 import { boxOf, type VoxelBox } from './box';

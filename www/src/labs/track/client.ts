@@ -1,4 +1,4 @@
-import { Channel } from '../../engine/channel';
+import { EngineChannel } from '../../engine/channel';
 import type { Requests, WorkerEvent } from './protocol';
 
 /**
@@ -9,6 +9,6 @@ export const spawnTrack = () =>
 
 /** Connects the page to that worker. */
 export const connectTrack = (onEvent: (event: WorkerEvent) => void) =>
-  new Channel<Requests, WorkerEvent>(spawnTrack, onEvent);
+  new EngineChannel<Requests, WorkerEvent>(spawnTrack, onEvent);
 
 export type TrackClient = ReturnType<typeof connectTrack>;

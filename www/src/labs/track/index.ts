@@ -1,4 +1,4 @@
-import { toFailure } from '../../engine/channel';
+import { toFailure } from '../../engine/failure';
 
 import { prefersReducedMotion } from '../../kit/dom';
 import { History } from '../../kit/history';

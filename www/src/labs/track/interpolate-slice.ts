@@ -4,14 +4,14 @@
  */
 
 import { Volume } from 'vesicle';
+import { VesicleError } from 'vesicle/channel';
 import { quantize } from '../../engine/quantize';
-import { Refusal } from '../../engine/refusal';
 import { text } from '../../texts';
 import type { InterpolatedSlice } from './protocol';
 
 /**
  * Interpolates slice number `slice` across the last voxel axis from its two neighbours, and returns both interpolations
- * with the measured slice, the neighbours and the errors. Throws a `Refusal` for the first and last slice.
+ * with the measured slice, the neighbours and the errors. Throws a `VesicleError` for the first and last slice.
  */
 export function interpolateSlice(
   volume: Volume,
@@ -21,7 +21,7 @@ export function interpolateSlice(
 ): InterpolatedSlice {
   const [width, height, slices] = volume.dims;
   if (slice < 1 || slice + 1 >= slices)
-    throw new Refusal('invalid-argument', text('track.noNeighbours', { slice, slices }));
+    throw new VesicleError('invalid-argument', text('track.noNeighbours', { slice, slices }));
   const [before, measured, after] = [-1, 0, 1].map((off) => volume.slice(2, slice + off, frame)) as Three;
   const interpolated = (method: 'flow' | 'linear') => interpolate(before, after, width, height, method);
   const [linear, flow] = [interpolated('linear'), interpolated('flow')];

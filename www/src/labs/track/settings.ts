@@ -1,4 +1,4 @@
-import { toFailure } from '../../engine/channel';
+import { toFailure } from '../../engine/failure';
 import type { ParamValues } from '../../engine/protocol';
 import type { Moments } from '../../lab/session/moments';
 import type { LabStates } from '../../lab/states';

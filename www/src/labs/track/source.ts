@@ -2,7 +2,6 @@
 
 import { SurfaceTracker, VesicleError, Volume } from 'vesicle';
 import { groupFiles } from '../../engine/file-groups';
-import { Refusal } from '../../engine/refusal';
 import { beyondSmall, MOST_VOXELS_OF_SMALL, TRACK_OF_SMALL } from '../../engine/small-files';
 import { checkSmallImage, readFiles } from '../../engine/volumes';
 import { invert } from '../../scene/anatomy';
@@ -33,12 +32,12 @@ export async function openImage(source: ImageSource, isSmall = false): Promise<V
   const image = await fromParts(groupFiles(source.files), isSmall);
   if (image.frames > 1) return image;
   image.free();
-  throw new Refusal('invalid-argument', text('track.oneFrame'));
+  throw new VesicleError('invalid-argument', text('track.oneFrame'));
 }
 
 async function fromParts(parts: NamedBytes[][], isSmall: boolean): Promise<Volume> {
   const [first] = parts;
-  if (!first) throw new Refusal('bad-file', text('track.noHeader'));
+  if (!first) throw new VesicleError('bad-file', text('track.noHeader'));
   const opened = async (files: NamedBytes[]) => {
     const init = await readFiles(files);
     const [x, y, z, frames = 1] = init.dims;
@@ -58,13 +57,13 @@ async function fromParts(parts: NamedBytes[][], isSmall: boolean): Promise<Volum
 /** Returns an error in words of the app: of an object that is too large for a tracker, what to do about it here. */
 export function inWords(error: unknown): unknown {
   const isTooLarge = error instanceof VesicleError && error.code === 'too-large';
-  return isTooLarge ? new Refusal(error.code, text('track.tooLarge')) : error;
+  return isTooLarge ? new VesicleError(error.code, text('track.tooLarge')) : error;
 }
 
 /** The largest factor by which the library multiplies slices. */
 const MOST_SLICES = 16;
 
-/** Throws a `Refusal` if small files would become an image that is too large for the memory of a page. */
+/** Throws a `VesicleError` if small files would become an image that is too large for the memory of a page. */
 export function checkSmall(
   { dims, frames, spacing }: Pick<Volume, 'dims' | 'frames' | 'spacing'>,
   preparation: Preparation,
@@ -75,7 +74,7 @@ export function checkSmall(
     preparation.factor || Math.min(MOST_SLICES, Math.max(1, Math.round(thickest / ((finest + middle) / 2))));
   const voxels = (dims[0] * dims[1] * dims[2] * frames * factor) / preparation.binning ** 2;
   if (voxels <= MOST_VOXELS_OF_SMALL) return;
-  throw new Refusal('too-large', beyondSmall('track.smallTooLarge', voxels, MOST_VOXELS_OF_SMALL));
+  throw new VesicleError('too-large', beyondSmall('track.smallTooLarge', voxels, MOST_VOXELS_OF_SMALL));
 }
 
 /**

@@ -1,11 +1,12 @@
 /** Worker of the Track lab: holds one 4D image and one tracker, and serves the page's requests. */
 
 import type { StepReport, SurfaceTracker, Volume } from 'vesicle';
+import { send as post, VesicleError, withTransfer } from 'vesicle/channel';
 import { toCode } from '../../engine/code';
+import { workerFailure } from '../../engine/failure';
 import { inWorld } from '../../engine/placing';
-import { Refusal, toFailure } from '../../engine/refusal';
 import { logged, type RunLog, RunRecorder } from '../../engine/run-log';
-import { type Handlers, sender, serve, Work, withTransfer } from '../../engine/serving';
+import { type Handlers, serveLab, Work } from '../../engine/serving';
 import { transferOf } from '../../engine/surface-buffers';
 import { displayOf, intensitiesOf, viewOf } from '../../engine/volumes';
 import type { Warning } from '../../engine/warnings';
@@ -39,7 +40,7 @@ import { buildTracker, checkSmall, inWords, openImage, prepare, proposeFor } fro
  */
 const BOUNDARY_PARAMS = ['threshold', 'window', 'windowFrames', 'cyclic'];
 
-const send = sender<WorkerEvent>();
+const send = post<WorkerEvent>;
 
 /** A 4D image as opened, and as prepared for tracking. */
 interface LoadedImage {
@@ -180,12 +181,12 @@ class Session {
   }
 
   #image(): LoadedImage {
-    if (!this.#loaded) throw new Refusal('invalid-argument', text('track.noImage'));
+    if (!this.#loaded) throw new VesicleError('invalid-argument', text('track.noImage'));
     return this.#loaded;
   }
 
   #current(): SurfaceTracker {
-    if (!this.#tracker) throw new Refusal('invalid-argument', text('track.noImage'));
+    if (!this.#tracker) throw new VesicleError('invalid-argument', text('track.noImage'));
     return this.#tracker;
   }
 
@@ -223,7 +224,7 @@ class Session {
       await tracker.run({ signal, onStep: (report) => this.#stepped(report) });
     } catch (error) {
       // After the state event, so that the page shows the failure on top of that state.
-      if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: toFailure(inWords(error)) }));
+      if (!signal.aborted) queueMicrotask(() => send({ event: 'failure', failure: workerFailure(inWords(error)) }));
     }
     this.#reportStopped();
   }
@@ -380,4 +381,4 @@ function same(one: unknown, other: unknown): boolean {
   return JSON.stringify(one) === JSON.stringify(other);
 }
 
-serve('tracking', new Session().handlers);
+serveLab('tracking', new Session().handlers);
