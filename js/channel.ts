@@ -86,8 +86,8 @@ type Failure =
   | { kind: 'error'; code: ErrorCode; message: string }
   | { kind: 'crash'; message: string; cause: Error | undefined }
   | { kind: 'aborted' }
-  /** Any other error, with its name, which structured cloning loses unless the error is one of JavaScript's own. */
-  | { kind: 'other'; name: string; error: Error };
+  /** Any other error, in parts: cloning loses the name unless it is one of JavaScript's own, and Node more of others. */
+  | { kind: 'other'; name: string; message: string; stack: string | undefined };
 
 interface Request {
   id: number;
@@ -253,7 +253,10 @@ const isOfRequest = (message: unknown): message is Answer | Report =>
 const notStarted = (what: string) => new Error(`the worker could not be started: ${what}`);
 
 function errorOf(failure: Failure): Error {
-  if (failure.kind === 'other') return Object.defineProperty(failure.error, 'name', { value: failure.name });
+  if (failure.kind === 'other') {
+    const { name, message, stack } = failure;
+    return Object.assign(new Error(message), { name, ...(stack !== undefined && { stack }) });
+  }
   if (failure.kind === 'aborted') return new VesicleError('aborted', 'the run was aborted');
   if (failure.kind === 'error') return new VesicleError(failure.code, failure.message);
   const crash = new VesicleCrash('', { cause: failure.cause });
@@ -279,7 +282,7 @@ function listen(worker: Worker | NodeWorker, receive: (message: unknown) => void
   worker.addEventListener('messageerror', garbled);
 }
 
-/** What the handler of a request gets besides the body. */
+/** Second argument of the handler of a request. */
 export interface RequestContext<Report = never> {
   /** Aborts when the page aborts the request. */
   signal: AbortSignal;
@@ -365,8 +368,8 @@ function failureOf(error: unknown): Failure {
     return { kind: 'crash', message: error.message, cause: error.cause ? asError(error.cause) : undefined };
   }
   if (error instanceof VesicleError) return { kind: 'error', code: error.code, message: error.message };
-  const other = asError(error);
-  return { kind: 'other', name: other.name, error: other };
+  const { name, message, stack } = asError(error);
+  return { kind: 'other', name, message, stack };
 }
 
 const asError = (error: unknown) => (error instanceof Error ? error : new Error(String(error)));

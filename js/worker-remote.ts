@@ -174,7 +174,7 @@ function deserialize(value: unknown, connection: Connection): unknown {
   });
 }
 
-/** What is called: an object or a class; undefined for a free function. */
+/** The object or class that is called; undefined for a free function. */
 type Target = Remote | ClassName | undefined;
 
 /** Posts a call of `name` to the worker, and resolves with its result. */
@@ -204,7 +204,7 @@ async function coverage(remote: Remote, given?: CoverageOptions): Promise<unknow
 
 type Listener = (report: Report) => void;
 
-/** What stays on the page when an abortable method is called, and options of an operation of `inSlices`. */
+/** Signal and listener, which stay on the page, of an abortable call, and options of an operation of `inSlices`. */
 interface Extras {
   signal?: AbortSignal | undefined;
   listener?: Listener | undefined;

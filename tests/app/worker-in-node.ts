@@ -1,6 +1,6 @@
 /** Runs the code of a lab's worker in Node, and talks to it as the page does. */
 
-type Reply = { id: number; value?: unknown; failure?: { message: string; error?: Error } };
+type Reply = { id: number; value?: unknown; failure?: { message: string } };
 type Table<Requests> = { [K in keyof Requests]: { body: unknown; reply: unknown } };
 
 /**
@@ -35,7 +35,7 @@ export async function startWorker<Requests extends Table<Requests>>(
       const answer = new Promise<Reply>((resolve) => pending.set(id, resolve));
       send({ id, kind, body, reports: false });
       const { value, failure } = await answer;
-      if (failure) throw new Error(failure.error?.message ?? failure.message);
+      if (failure) throw new Error(failure.message);
       return value;
     },
   };

@@ -5,12 +5,12 @@ import type { Failure } from './protocol';
 import type { Hold } from './serving';
 
 /**
- * Worker that {@link preloadWorker} has started and no {@link Channel} has taken over yet; undefined if there is none.
+ * Worker that {@link preloadWorker} has started and no {@link EngineChannel} has taken over yet; undefined if there is none.
  */
 let preloaded: { spawn: () => Worker; worker: Worker } | undefined;
 
 /**
- * Starts a lab's worker before the lab's own code is loaded, so that both load in parallel. The next {@link Channel}
+ * Starts a lab's worker before the lab's own code is loaded, so that both load in parallel. The next {@link EngineChannel}
  * created with the same `spawn` takes the worker over.
  */
 export function preloadWorker(spawn: () => Worker): void {
@@ -29,6 +29,7 @@ function takeWorker(spawn: () => Worker): Worker {
   if (preloaded?.spawn !== spawn) return spawn();
   const { worker } = preloaded;
   preloaded = undefined;
+  worker.onerror = null;
   return worker;
 }
 
@@ -45,8 +46,10 @@ async function released(lock: string): Promise<void> {
   await navigator.locks?.request(lock, { signal }, () => undefined).catch(() => undefined);
 }
 
-interface Waiting<Connection> {
-  send: (connection: Connection) => void;
+type Connection<Requests extends RequestTable<Requests>, Event, Message> = Channel<Requests, Event, Message | Hold>;
+
+interface Waiting<To> {
+  send: (connection: To) => void;
   refuse: (error: RequestError) => void;
 }
 
@@ -62,11 +65,11 @@ export class EngineChannel<
   readonly #spawn: () => Worker;
   readonly #onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void;
   /** The connection to the worker; undefined until the one before has ended. */
-  #connection: Channel<Requests, Event, Message | Hold> | undefined;
+  #connection: Connection<Requests, Event, Message> | undefined;
   /** Name of the lock that the worker holds until it has ended. */
   #lock = '';
   /** Requests and messages that wait for the worker. */
-  #waiting: Waiting<Channel<Requests, Event, Message | Hold>>[] = [];
+  #waiting: Waiting<Connection<Requests, Event, Message>>[] = [];
   #isClosed = false;
 
   constructor(spawn: () => Worker, onEvent: (event: Event | { event: 'failure'; failure: Failure }) => void) {
@@ -82,7 +85,7 @@ export class EngineChannel<
   ): Promise<Requests[K]['reply']> {
     return new Promise((resolve, reject) => {
       const refuse = (error: RequestError) => this.#isClosed || reject(error);
-      const send = (connection: Channel<Requests, Event, Message | Hold>) => {
+      const send = (connection: Connection<Requests, Event, Message>) => {
         // It throws, and does not reject, where nothing can be sent.
         const answered = async () => connection.request(kind, body, { transfer });
         void answered().then(resolve, (error) => refuse(requestError(error, connection.ended)));
@@ -96,7 +99,7 @@ export class EngineChannel<
     this.#send({ send: (connection) => connection.post(message, transfer), refuse: () => undefined });
   }
 
-  #send(one: Waiting<Channel<Requests, Event, Message | Hold>>): void {
+  #send(one: Waiting<Connection<Requests, Event, Message>>): void {
     if (this.#connection) one.send(this.#connection);
     else this.#waiting.push(one);
   }
