@@ -27,8 +27,12 @@
  * const { positions, indices } = await channel.request('extract', { file, iso: 95 }, { signal, onReport });
  * ```
  *
+ * In TypeScript a {@link RequestTable} types both ends: `new Channel<Requests>(worker)` and `serve<Requests>({ … })` with
+ * `interface Requests { extract: { body: { file: Uint8Array; iso: number }; reply: MeshArrays; report: StepReport } }`.
+ *
  * Bodies, replies, reports, events and messages are whatever `postMessage` can send. The worker handles requests in
- * order, each up to its first `await`, and others meanwhile.
+ * order, each up to its first `await`, and others meanwhile. In Node, the worker keeps the program running until it has
+ * answered all requests, and no longer, whatever events it may send.
  *
  * **Errors.** A request rejects with what its handler throws: a {@link VesicleError} with its code, a
  * {@link VesicleCrash}, with which the channel ends, any other error with its name and message.
@@ -77,16 +81,21 @@ export interface RequestOptions<Report = never> {
 export interface ChannelOptions<Event = never> {
   /** Receives what the worker sends of its own accord. */
   onEvent?: (event: Event) => void;
-  /** Called when the worker ends by itself: with the error with which all pending requests reject. */
+  /** Called when the worker ends by itself or crashes: with the error with which all pending requests reject. */
   onEnd?: (error: Error) => void;
+  /**
+   * Makes the error of a worker that ended by itself, because of `what`, before or after it had sent anything; a plain
+   * `Error` by default.
+   */
+  errorOfEnd?: (what: string, hasStarted: boolean) => Error;
 }
 
 /** An error in the worker, from which the page makes an equal one. */
 type Failure =
   | { kind: 'error'; code: ErrorCode; message: string }
-  | { kind: 'crash'; message: string; cause: Error | undefined }
+  | { kind: 'crash'; message: string; cause: string | undefined }
   | { kind: 'aborted' }
-  /** Any other error, in parts: cloning loses the name unless it is one of JavaScript's own, and Node more of others. */
+  /** Any other error, in parts: cloning loses the name unless it is one of JavaScript's own, and in Node more. */
   | { kind: 'other'; name: string; message: string; stack: string | undefined };
 
 interface Request {
@@ -104,6 +113,10 @@ interface Abort {
 
 type Answer = { id: number; value: unknown } | { id: number; failure: Failure };
 type Report = { id: number; report: unknown };
+
+/** All messages are of the channel, which wraps those of its users, so that no key of theirs is treated as one of its own. */
+type ToWorker<Message> = Request | Abort | { message: Message };
+type ToPage<Event> = Answer | Report | { event: Event };
 
 interface PendingRequest {
   resolve: (reply: unknown) => void;
@@ -129,14 +142,14 @@ export class Channel<Requests extends RequestTable<Requests>, Event = never, Mes
   #hasStarted = false;
   #end: Error | undefined;
 
-  constructor(worker: Worker | NodeWorker, { onEvent, onEnd }: ChannelOptions<Event> = {}) {
+  constructor(worker: Worker | NodeWorker, { onEvent, onEnd, errorOfEnd = endOf }: ChannelOptions<Event> = {}) {
     this.#worker = worker;
     this.#onEvent = onEvent;
     this.#onEnd = onEnd;
     listen(
       worker,
-      (message) => this.#receive(message as Answer | Report | Event),
-      (what) => this.#fail(this.#hasStarted ? new VesicleCrash(`The worker ended: ${what}`) : notStarted(what)),
+      (message) => this.#receive(message as ToPage<Event>),
+      (what) => this.#fail(errorOfEnd(what, this.#hasStarted)),
     );
   }
 
@@ -161,7 +174,7 @@ export class Channel<Requests extends RequestTable<Requests>, Event = never, Mes
     if (signal?.aborted) return Promise.reject(signal.reason);
     this.#lastId += 1;
     const id = this.#lastId;
-    this.#send({ id, kind, body, reports: onReport !== undefined } satisfies Request, transfer);
+    this.#send({ id, kind, body, reports: onReport !== undefined }, transfer);
     // Keeps Node running as long as requests are pending, and no longer.
     if ('ref' in this.#worker) this.#worker.ref();
     const forget = onAbort(signal, () => this.#abort(id, signal?.reason));
@@ -172,7 +185,7 @@ export class Channel<Requests extends RequestTable<Requests>, Event = never, Mes
 
   /** Sends a message that has no reply; nothing is sent after the end of the channel. */
   post(message: Message, transfer: Transferable[] = []): void {
-    if (!this.#end) this.#send(message, transfer);
+    if (!this.#end) this.#send({ message }, transfer);
   }
 
   /** Terminates the worker: all pending requests reject with `reason`, and later ones throw it. */
@@ -193,7 +206,7 @@ export class Channel<Requests extends RequestTable<Requests>, Event = never, Mes
     this.#onEnd?.(error);
   }
 
-  #send(message: unknown, transfer: Transferable[]): void {
+  #send(message: ToWorker<Message>, transfer: Transferable[]): void {
     try {
       this.#worker.postMessage(message, transfer as ArrayBuffer[]);
     } catch (error) {
@@ -206,13 +219,13 @@ export class Channel<Requests extends RequestTable<Requests>, Event = never, Mes
     const request = this.#pending.get(id);
     if (!request || request.aborted) return;
     request.aborted = { reason };
-    this.#send({ abort: id } satisfies Abort, []);
+    this.#send({ abort: id }, []);
   }
 
-  #receive(message: Answer | Report | Event): void {
+  #receive(message: ToPage<Event>): void {
     this.#hasStarted = true;
     if (this.#end) return;
-    if (!isOfRequest(message)) this.#onEvent?.(message as Event);
+    if ('event' in message) this.#onEvent?.(message.event);
     else if ('report' in message) this.#report(message);
     else this.#settle(message);
   }
@@ -233,29 +246,35 @@ export class Channel<Requests extends RequestTable<Requests>, Event = never, Mes
     this.#pending.delete(answer.id);
     request.forget();
     if ('unref' in this.#worker && this.#pending.size === 0) this.#worker.unref();
-    const error = 'failure' in answer && errorOf(answer.failure);
-    if (error instanceof VesicleCrash) {
-      request.reject(error);
-      this.#fail(error);
-      return;
+    if ('failure' in answer) {
+      const error = errorOf(answer.failure);
+      request.reject(request.aborted && !(error instanceof VesicleCrash) ? request.aborted.reason : error);
+      if (error instanceof VesicleCrash) this.#fail(error);
+    } else this.#resolve(request, answer.value);
+  }
+
+  #resolve({ resolve, reject, options, aborted }: PendingRequest, value: unknown): void {
+    try {
+      const reply = options.receive ? options.receive(value) : value;
+      if (aborted) reject(aborted.reason);
+      else resolve(reply);
+    } catch (error) {
+      reject(error);
     }
-    const { receive } = request.options;
-    const reply = 'value' in answer && (receive ? receive(answer.value) : answer.value);
-    if (request.aborted) request.reject(request.aborted.reason);
-    else if (error) request.reject(error);
-    else request.resolve(reply);
   }
 }
 
-const isOfRequest = (message: unknown): message is Answer | Report =>
-  message instanceof Object && Object.hasOwn(message, 'id');
+const endOf = (what: string, hasStarted: boolean) =>
+  new Error(`the worker ${hasStarted ? 'ended' : 'could not be started'}: ${what}`);
 
-const notStarted = (what: string) => new Error(`the worker could not be started: ${what}`);
+/** Errors of JavaScript's own that the page makes again as such. */
+const NATIVE: Record<string, ErrorConstructor> = { TypeError, RangeError, SyntaxError, ReferenceError };
 
 function errorOf(failure: Failure): Error {
   if (failure.kind === 'other') {
     const { name, message, stack } = failure;
-    return Object.assign(new Error(message), { name, ...(stack !== undefined && { stack }) });
+    const Native = (Object.hasOwn(NATIVE, name) && NATIVE[name]) || Error;
+    return Object.assign(new Native(message), { name, ...(stack !== undefined && { stack }) });
   }
   if (failure.kind === 'aborted') return new VesicleError('aborted', 'the run was aborted');
   if (failure.kind === 'error') return new VesicleError(failure.code, failure.message);
@@ -310,10 +329,10 @@ export function serve<Requests extends RequestTable<Requests>, Message = never>(
   handlers: Handlers<Requests>,
   onMessage?: (message: Message) => void,
 ): void {
-  const receive = (data: Request | Abort | Message) => {
-    if (isAbort(data)) controllers.get(data.abort)?.abort(ABORTED);
-    else if (isRequest(data)) void answer(handlers as Record<string, Handler>, data);
-    else onMessage?.(data);
+  const receive = (data: ToWorker<Message>) => {
+    if ('abort' in data) controllers.get(data.abort)?.abort(ABORTED);
+    else if ('message' in data) onMessage?.(data.message);
+    else void answer(handlers as Record<string, Handler>, data);
   };
   withPort((port) => {
     if (port.on) port.on('message', receive as (data: unknown) => void);
@@ -323,15 +342,23 @@ export function serve<Requests extends RequestTable<Requests>, Message = never>(
 
 /** Sends an event of the worker's own accord to the page. */
 export function send<Event>(event: Event, transfer: Transferable[] = []): void {
-  withPort((port) => port.postMessage(event, transfer));
+  post({ event }, transfer);
+}
+
+function post(message: ToPage<unknown>, transfer: Transferable[] = []): void {
+  withPort((port) => port.postMessage(message, transfer));
 }
 
 /** For each reply marked by `withTransfer`, the buffers to transfer with it. */
 const transfers = new WeakMap<object, Transferable[]>();
 
-/** Marks arrays in a reply to be transferred to the page instead of copied; they are lost to the worker. */
-export function withTransfer<Reply extends object>(reply: Reply, arrays: Iterable<ArrayBufferView>): Reply {
-  transfers.set(reply, [...new Set(Array.from(arrays, ({ buffer }) => buffer as ArrayBuffer))]);
+/** Marks arrays or buffers in a reply to be transferred to the page instead of copied; they are lost to the worker. */
+export function withTransfer<Reply extends object>(
+  reply: Reply,
+  arrays: Iterable<ArrayBufferView | ArrayBuffer>,
+): Reply {
+  const buffers = Array.from(arrays, (array) => (ArrayBuffer.isView(array) ? (array.buffer as ArrayBuffer) : array));
+  transfers.set(reply, [...new Set(buffers)]);
   return reply;
 }
 
@@ -340,39 +367,44 @@ type Handler = (body: unknown, context: RequestContext<unknown>) => unknown;
 async function answer(handlers: Record<string, Handler>, { id, kind, body, reports }: Request): Promise<void> {
   const controller = new AbortController();
   controllers.set(id, controller);
-  const report = reports ? (value: unknown) => send({ id, report: value } satisfies Report) : undefined;
+  const report = reports ? (value: unknown) => post({ id, report: value }) : undefined;
   try {
     const handler = Object.hasOwn(handlers, kind) ? handlers[kind] : undefined;
     if (!handler) throw new VesicleError('invalid-argument', `${kind}: the worker has no handler of such requests`);
     const value = await handler(body, { signal: controller.signal, report });
-    const transfer = value instanceof Object ? transfers.get(value) : undefined;
-    send({ id, value } satisfies Answer, transfer);
+    post({ id, value }, transfers.get(value as object));
   } catch (error) {
-    send({ id, failure: failureOf(error) } satisfies Answer);
+    post({ id, failure: failureOf(error) });
   } finally {
     controllers.delete(id);
   }
 }
 
-function isRequest(data: unknown): data is Request {
-  return data instanceof Object && Object.hasOwn(data, 'id') && Object.hasOwn(data, 'kind');
-}
-
-function isAbort(data: unknown): data is Abort {
-  return data instanceof Object && Object.hasOwn(data, 'abort');
-}
-
 function failureOf(error: unknown): Failure {
   if (error === ABORTED) return { kind: 'aborted' };
-  if (error instanceof VesicleCrash) {
-    return { kind: 'crash', message: error.message, cause: error.cause ? asError(error.cause) : undefined };
-  }
-  if (error instanceof VesicleError) return { kind: 'error', code: error.code, message: error.message };
-  const { name, message, stack } = asError(error);
+  const { name, message, stack, code, cause } = partsOf(error);
+  // Not by the class: `vesicle/inline` has classes of its own.
+  if (name === 'VesicleCrash') return { kind: 'crash', message, cause };
+  if (name === 'VesicleError' && code !== undefined) return { kind: 'error', code: code as ErrorCode, message };
   return { kind: 'other', name, message, stack };
 }
 
-const asError = (error: unknown) => (error instanceof Error ? error : new Error(String(error)));
+/** Parts of whatever was thrown, as strings, which can be sent; none where even that fails. */
+function partsOf(error: unknown) {
+  const part = (name: string) => {
+    const value = (error as Record<string, unknown> | undefined)?.[name];
+    return typeof value === 'string' ? value : undefined;
+  };
+  try {
+    const { cause } = (error ?? {}) as { cause?: unknown };
+    const message = error instanceof Error || part('message') !== undefined ? (part('message') ?? '') : String(error);
+    const given = { stack: part('stack'), code: part('code'), cause: cause === undefined ? undefined : String(cause) };
+    return { name: part('name') ?? 'Error', message, ...given };
+  } catch {
+    const message = 'the error of a handler cannot be sent';
+    return { name: 'Error', message, stack: undefined, code: undefined, cause: undefined };
+  }
+}
 
 /** The worker's end of the connection; only that of Node has `on`. */
 interface Port {
@@ -381,20 +413,20 @@ interface Port {
 }
 
 let port: Port | undefined;
-let loading: Promise<Port> | undefined;
+/** In Node, what waits for the port to be loaded. */
+const waiting: ((port: Port) => void)[] = [];
 
-/** Acts at once, so that errors are the caller's; but in Node after the port was loaded. */
+/** Acts at once, so that errors are the caller's; but in Node after the port was loaded, in order. */
 function withPort(act: (port: Port) => void): void {
   if ('postMessage' in globalThis) port = globalThis as unknown as Port;
-  loading ??= port ? Promise.resolve(port) : loadPort();
   if (port) act(port);
-  else void loading.then(act);
+  else if (waiting.push(act) === 1) void loadPort();
 }
 
-async function loadPort(): Promise<Port> {
+async function loadPort(): Promise<void> {
   // Hidden from bundlers: a page never gets here.
   const threads = 'node:worker_threads';
   const { parentPort } = await import(/* @vite-ignore */ /* webpackIgnore: true */ threads);
+  for (const act of waiting) act(parentPort);
   port = parentPort;
-  return parentPort;
 }

@@ -1,7 +1,7 @@
 // Starts and terminates the worker, for any origin of page and package.
 import { Channel, type NodeWorker } from './channel.js';
 import { checkProperties } from './check.js';
-import { VesicleError } from './error.js';
+import { VesicleCrash, VesicleError } from './error.js';
 import type { InitInput, ModuleOptions } from './runtime.js';
 import type { Connection, Requests } from './worker-protocol.js';
 
@@ -72,11 +72,18 @@ async function start(given: WorkerInit, own: number): Promise<void> {
     worker,
   } = checkProperties('options', given, ['module', 'module_or_path', 'worker']);
   const module = await sendable(await (one ?? module_or_path));
-  const started: Connection = new Channel(worker ?? (globalThis.Worker ? browserWorker() : await nodeWorker()));
+  const started: Connection = new Channel(worker ?? (globalThis.Worker ? browserWorker() : await nodeWorker()), {
+    errorOfEnd,
+  });
   if (own === startCount) connection = started;
   else started.end(terminated());
   await started.request('init', module);
 }
+
+const errorOfEnd = (what: string, hasStarted: boolean) =>
+  hasStarted
+    ? new VesicleCrash(`The worker ended: ${what}`)
+    : new Error(`init: the worker could not be started: ${what}`);
 
 /** Ends the connection to the worker after a failed start; a later call of `init` tries again. */
 function resetAfterFailure(error: unknown): void {

@@ -2,12 +2,11 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest';
 import { EngineChannel } from '../../www/src/engine/channel';
 
-type Requests = { open: { body: string; reply: string } };
-interface Message {
+type Requests = { open: { body: string; reply: string }; wait: { body: undefined; reply: undefined } };
+interface Request {
   id: number;
   kind: string;
   body: string;
-  lock: string;
 }
 
 /** Locks of the page, each held until its worker is said to have ended. */
@@ -16,7 +15,7 @@ const workers: FakeWorker[] = [];
 
 /** A worker that answers at once, and holds its lock also when it is terminated. */
 class FakeWorker {
-  #listener: ((event: { data: unknown }) => void) | undefined;
+  readonly #listeners: Record<string, (event: object) => void> = {};
   readonly kinds: string[] = [];
   isTerminated = false;
   #ended: () => void = () => undefined;
@@ -25,15 +24,26 @@ class FakeWorker {
     workers.push(this);
   }
 
-  addEventListener(type: string, listener: (event: { data: unknown }) => void): void {
-    if (type === 'message') this.#listener = listener;
+  addEventListener(type: string, listener: (event: object) => void): void {
+    this.#listeners[type] = listener;
   }
 
-  postMessage({ id, kind, body, lock }: Message): void {
+  /** Ends as by an error that nothing catches. */
+  fail(message: string): void {
+    this.#listeners.error?.({ message, preventDefault: () => undefined });
+  }
+
+  postMessage(sent: Request | { message: { kind: 'hold'; lock: string } }): void {
+    if ('message' in sent) {
+      const { kind, lock } = sent.message;
+      this.kinds.push(kind);
+      held.set(lock, () => undefined);
+      this.#ended = () => held.get(lock)?.();
+      return;
+    }
+    const { id, kind, body } = sent;
     this.kinds.push(kind);
-    if (kind === 'hold') held.set(lock, () => undefined);
-    if (kind === 'hold') this.#ended = () => held.get(lock)?.();
-    else queueMicrotask(() => this.#listener?.({ data: { id, value: body } }));
+    if (kind === 'open') queueMicrotask(() => this.#listeners.message?.({ data: { id, value: body } }));
   }
 
   terminate(): void {
@@ -100,4 +110,29 @@ test('without locks nothing is waited for', async () => {
   const channel = open();
   channel.restart(CANCELLED);
   expect(await channel.request('open', 'a')).toBe('a');
+});
+
+test('requests of a broken worker fail, also where the channel is closed when that is said', async () => {
+  const said: object[] = [];
+  const channel: EngineChannel<Requests, never> = new EngineChannel<Requests, never>(
+    () => new FakeWorker() as unknown as Worker,
+    (event) => {
+      said.push(event);
+      channel.close();
+    },
+  );
+  await channel.request('open', 'a');
+  const waiting = channel.request('wait', undefined);
+  workers[0]?.fail('no memory');
+  await expect(waiting).rejects.toMatchObject({ code: 'internal', message: 'no memory' });
+  expect(said).toEqual([{ event: 'failure', failure: { code: 'internal', message: 'no memory' } }]);
+});
+
+test('requests of a lab that is closed are never settled', async () => {
+  const channel = open();
+  const settled = vi.fn();
+  channel.request('wait', undefined).then(settled, settled);
+  channel.close();
+  await new Promise(setImmediate);
+  expect(settled).not.toHaveBeenCalled();
 });

@@ -7,6 +7,7 @@ import { Channel, type ChannelOptions, VesicleCrash, VesicleError } from '../../
 interface Requests {
   double: { body: Float32Array; reply: Float32Array };
   count: { body: number; reply: string; report: number };
+  echo: { body: unknown; reply: unknown };
   fail: { body: string; reply: never };
   unsendable: { body: undefined; reply: unknown };
   wait: { body: undefined; reply: string };
@@ -21,6 +22,10 @@ const SCRIPT = `
       type: () => new TypeError('not a function'),
       dom: () => new DOMException('gone', 'NotFoundError'),
       text: () => 'only words',
+      bare: () => Object.create(null),
+      odd: () => Object.assign(new Error('odd'), { message: () => 1, name: Symbol('odd') }),
+      nested: () => new VesicleCrash('unreachable', { cause: new Error('a', { cause: () => 1 }) }),
+      own: () => Object.assign(new Error('of another copy'), { name: 'VesicleError', code: 'precision' }),
     };
     serve(
       {
@@ -36,6 +41,7 @@ const SCRIPT = `
           }
           return report ? 'reported' : 'silent';
         },
+        echo: (value) => value,
         fail: (which) => {
           throw errors[which]();
         },
@@ -43,13 +49,14 @@ const SCRIPT = `
         // Comes to an end although it is aborted.
         wait: (_, { signal }) => new Promise((resolve) => signal.addEventListener('abort', () => resolve('all the same'))),
       },
-      ({ shout }) => send({ event: shout.toUpperCase() }),
+      (message) => send({ ...message, event: message.shout?.toUpperCase() }),
     );
     send({ event: 'ready' });
   });`;
 
 interface Shout {
   shout: string;
+  [more: string]: unknown;
 }
 
 const opened: Channel<Requests, { event: string }, Shout>[] = [];
@@ -118,7 +125,11 @@ test('errors keep what they are', async () => {
   expect(known).toMatchObject({ code: 'bad-file', message: 'NRRD: sizes' });
   await expect(channel.request('fail', 'type')).rejects.toMatchObject({ name: 'TypeError', message: 'not a function' });
   await expect(channel.request('fail', 'dom')).rejects.toMatchObject({ name: 'NotFoundError', message: 'gone' });
+  await expect(channel.request('fail', 'type')).rejects.toBeInstanceOf(TypeError);
+  await expect(channel.request('fail', 'own')).rejects.toMatchObject({ code: 'precision', message: 'of another copy' });
   await expect(channel.request('fail', 'text')).rejects.toThrow('only words');
+  await expect(channel.request('fail', 'bare')).rejects.toThrow('cannot be sent');
+  await expect(channel.request('fail', 'odd')).rejects.toThrow('cannot be sent');
   await expect(channel.request('unsendable', undefined)).rejects.toThrow('could not be cloned');
   const unknown = channel as unknown as Channel<{ other: { body: undefined; reply: undefined } }>;
   for (const kind of ['other', 'constructor', '__proto__'])
@@ -136,6 +147,7 @@ test('a crash ends the channel, with all that is pending', async () => {
   await expect(crashed).rejects.toBeInstanceOf(VesicleCrash);
   await expect(pending).rejects.toThrow('unreachable');
   expect(() => channel.request('count', 1)).toThrow('unreachable');
+  await expect(open().request('fail', 'nested')).rejects.toMatchObject({ code: 'crash', cause: 'Error: a' });
   expect(ends).toEqual([channel.ended]);
 });
 
@@ -154,6 +166,38 @@ test('messages have no reply, and events come of themselves', async () => {
   expect(events).toEqual(['ready', 'HELLO']);
 });
 
+test('keys of bodies, messages and events are never taken for those of the channel', async () => {
+  const like = { id: 1, kind: 'echo', value: 2, report: 3, failure: 4, abort: 1, message: 5 };
+  const events: object[] = [];
+  let channel: Channel<Requests, { event: string }, Shout> | undefined;
+  const heard = new Promise<void>((resolve) => {
+    channel = open({ onEvent: (event) => events.push(event) === 2 && resolve() });
+  });
+  const pending = channel?.request('echo', like);
+  channel?.post({ ...like, shout: 'a' });
+  expect(await pending).toEqual(like);
+  await heard;
+  expect(events).toEqual([{ event: 'ready' }, { ...like, shout: 'a', event: 'A' }]);
+});
+
+test('a reply that cannot be received rejects', async () => {
+  const receive = () => {
+    throw new Error('not that');
+  };
+  await expect(open().request('echo', 1, { receive })).rejects.toThrow('not that');
+});
+
+test('events are in order from the first on', async () => {
+  const script = `import(${JSON.stringify(library)}).then(async ({ send }) => {
+    for (let k = 0; k < 50; k++) { send({ event: String(k) }); await null; }
+  });`;
+  const events: string[] = [];
+  await new Promise<void>((resolve) => {
+    open({ onEvent: ({ event }) => events.push(event) === 50 && resolve() }, script);
+  });
+  expect(events).toEqual(Array.from({ length: 50 }, (_, k) => String(k)));
+});
+
 test('a worker that ends by itself, or does not start, ends the channel', async () => {
   const ended = async (script: string) => {
     let channel: Channel<Requests, { event: string }, Shout> | undefined;
@@ -167,9 +211,7 @@ test('a worker that ends by itself, or does not start, ends the channel', async 
   };
   expect((await ended('throw new Error("no luck")')).message).toContain('could not be started: no luck');
   const late = `${SCRIPT} setTimeout(() => process.exit(3), 200);`;
-  const error = await ended(late);
-  expect(error).toBeInstanceOf(VesicleCrash);
-  expect(error.message).toContain('exited with code 3');
+  expect((await ended(late)).message).toBe('the worker ended: exited with code 3');
 });
 
 test('a channel that its owner ends rejects what is pending with the reason, and says nothing', async () => {

@@ -647,7 +647,7 @@ test('unreachable objects are freed in the worker, those in use are not', () => 
     const freed = new Set();
     const post = worker.postMessage.bind(worker);
     worker.postMessage = (message, transfer) => {
-      if ('free' in message) freed.add(message.free);
+      if (message.message?.free) freed.add(message.message.free);
       post(message, transfer);
     };
     await init({ worker });

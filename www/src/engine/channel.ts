@@ -1,6 +1,6 @@
-import { Channel, type RequestTable, VesicleError } from 'vesicle/channel';
+import { Channel, type RequestTable } from 'vesicle/channel';
 import { text } from '../texts';
-import { RequestError, toFailure, workerFailure } from './failure';
+import { RequestError, workerFailure } from './failure';
 import type { Failure } from './protocol';
 import type { Hold } from './serving';
 
@@ -46,11 +46,14 @@ async function released(lock: string): Promise<void> {
   await navigator.locks?.request(lock, { signal }, () => undefined).catch(() => undefined);
 }
 
+/** Ends the connection of a lab that is being closed, whose requests are then never settled. */
+const CLOSED = new Error('the lab was closed');
+
 type Connection<Requests extends RequestTable<Requests>, Event, Message> = Channel<Requests, Event, Message | Hold>;
 
 interface Waiting<To> {
   send: (connection: To) => void;
-  refuse: (error: RequestError) => void;
+  refuse: (error: unknown) => void;
 }
 
 /**
@@ -84,11 +87,11 @@ export class EngineChannel<
     transfer: Transferable[] = [],
   ): Promise<Requests[K]['reply']> {
     return new Promise((resolve, reject) => {
-      const refuse = (error: RequestError) => this.#isClosed || reject(error);
+      const refuse = (error: unknown) => error === CLOSED || reject(requestError(error));
       const send = (connection: Connection<Requests, Event, Message>) => {
         // It throws, and does not reject, where nothing can be sent.
         const answered = async () => connection.request(kind, body, { transfer });
-        void answered().then(resolve, (error) => refuse(requestError(error, connection.ended)));
+        void answered().then(resolve, refuse);
       };
       this.#send({ send, refuse });
     });
@@ -122,13 +125,14 @@ export class EngineChannel<
   /** Terminates the worker and frees its memory. Pending requests are never settled, since the lab is being closed. */
   close(): void {
     this.#isClosed = true;
-    this.#connection?.end(new Error('the lab was closed'));
+    this.#connection?.end(CLOSED);
   }
 
   #start(): void {
     const connection = new Channel<Requests, Event, Message | Hold>(takeWorker(this.#spawn), {
       onEvent: this.#onEvent,
-      onEnd: (error) => this.#onEvent({ event: 'failure', failure: toFailure(requestError(error, error)) }),
+      onEnd: (error) => this.#onEvent({ event: 'failure', failure: workerFailure(error) }),
+      errorOfEnd: (what, hasStarted) => new Error(hasStarted ? what : text('shell.workerFailed')),
     });
     this.#connection = connection;
     this.#lock = `${LOCK} ${Math.random()}`;
@@ -138,11 +142,5 @@ export class EngineChannel<
   }
 }
 
-/** Converts an error of a connection, which may be the one with which it has ended. */
-function requestError(error: unknown, ended: Error | undefined): RequestError {
-  if (error instanceof RequestError) return error;
-  const hasNotStarted = error === ended && !(error instanceof VesicleError);
-  return new RequestError(
-    hasNotStarted ? { code: 'internal', message: text('shell.workerFailed') } : workerFailure(error),
-  );
-}
+const requestError = (error: unknown) =>
+  error instanceof RequestError ? error : new RequestError(workerFailure(error));
