@@ -180,7 +180,7 @@ test('keys of bodies, messages and events are never taken for those of the chann
   expect(events).toEqual([{ event: 'ready' }, { ...like, shout: 'a', event: 'A' }]);
 });
 
-test('a reply that cannot be received rejects', async () => {
+test('a request whose reply cannot be converted rejects', async () => {
   const receive = () => {
     throw new Error('not that');
   };

@@ -1,5 +1,4 @@
 /** Writes the log of a run as JavaScript that repeats the run to the same bits with the package alone. */
-
 import { paramSpecs, type Volume, version } from 'vesicle';
 import { VesicleError } from 'vesicle/channel';
 import { text } from '../texts';

@@ -192,7 +192,6 @@ export interface Failure {
   code: string;
   message: string;
 }
-export type ReplyMessage = { id: number; ok: true; body: unknown } | { id: number; ok: false; failure: Failure };
 /**
  * Event with the state of a lab's run: sent when a run starts and, after its last results, when it is done or was
  * stopped; also after single steps, in the Extract lab after seeding or restoring, and in the Track lab on request.

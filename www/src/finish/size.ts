@@ -1,5 +1,4 @@
 /** The size that edits of a session may give a surface, since a small file may come from anyone. */
-
 import type { Mesh } from 'vesicle';
 import { VesicleError } from 'vesicle/channel';
 import { callOf } from '../engine/edits';

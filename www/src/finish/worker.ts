@@ -1,5 +1,4 @@
 /** Worker that edits a surface after a run, and compares it with a reference. */
-
 import init, { Mesh, Volume } from 'vesicle';
 import { VesicleError, withTransfer } from 'vesicle/channel';
 import { apply } from '../engine/edits';

@@ -1,5 +1,4 @@
 /** Worker that reads formats of other programs (DICOM, TIFF) and writes them as files that all labs read. */
-
 import init, { Volume, type VolumeInit } from 'vesicle';
 import { send, VesicleError, withTransfer } from 'vesicle/channel';
 import { type Decoders, type DicomVolume, openDicom } from 'vesicle/dicom';

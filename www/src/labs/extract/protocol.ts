@@ -18,7 +18,6 @@ import type {
   ParamValues,
   Plane,
   PointArray,
-  ReplyMessage,
   StateEvent,
   StepReport,
   Surface,
@@ -167,10 +166,6 @@ export interface Requests extends CodeRequests {
   seed: { body: undefined; reply: number };
 }
 
-export type RequestKind = keyof Requests;
-
-export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
-
 /**
  * Message that returns to the worker, for reuse, the arrays of a surface that the page no longer draws; has no reply.
  */
@@ -178,8 +173,6 @@ export interface ReturnMessage {
   kind: 'return';
   buffers: SurfaceBuffers;
 }
-
-export type ToWorker = RequestMessage | ReturnMessage;
 
 export interface SnapshotEvent {
   event: 'snapshot';
@@ -245,5 +238,3 @@ export type WorkerEvent =
   | FailureEvent
   | ComparisonProgressEvent
   | CoverageProgressEvent;
-
-export type FromWorker = ReplyMessage | WorkerEvent;

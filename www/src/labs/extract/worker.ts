@@ -1,5 +1,4 @@
 /** Worker of the Extract lab: holds one volume and one model, and serves the page's requests. */
-
 import type { DeformableModel, Mesh, StepReport, Volume } from 'vesicle';
 import { send as post, VesicleError, withTransfer } from 'vesicle/channel';
 import { toCode } from '../../engine/code';

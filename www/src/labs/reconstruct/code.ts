@@ -1,5 +1,4 @@
 /** Code of the Reconstruct lab's runs. */
-
 import type { ImplicitChoice } from 'vesicle';
 import { VesicleError } from 'vesicle/channel';
 import { bytesOf, callsOf, chosen, type Program } from '../../engine/code';

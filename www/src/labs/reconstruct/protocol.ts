@@ -169,15 +169,12 @@ export interface Requests extends CodeRequests {
   cancelTiming: { body: undefined; reply: undefined };
 }
 
-export type RequestKind = keyof Requests;
-export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
 /**
  * Tells the worker that the surface it sent last is on the screen, so that it may send another preview; has no reply.
  */
 export interface ShownMessage {
   kind: 'shown';
 }
-export type ToWorker = RequestMessage | ShownMessage;
 
 /** Event with the reports of the steps since the last progress event. */
 export interface ProgressEvent {

@@ -1,5 +1,4 @@
 /** Worker of the Reconstruct lab: holds points, cameras and one model of them, and serves the page's requests. */
-
 import type { ImplicitSurface, StepReport } from 'vesicle';
 import { send as post, VesicleError } from 'vesicle/channel';
 import { toCode } from '../../engine/code';

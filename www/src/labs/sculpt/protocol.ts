@@ -192,8 +192,6 @@ export interface Requests extends CodeRequests {
   export: { body: ExportRequest; reply: Uint8Array };
 }
 
-export type RequestKind = keyof Requests;
-export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
 /** Tells the worker that a frame is on the screen, so that it may send another; has no reply. */
 export interface ShownMessage {
   kind: 'shown';
@@ -209,7 +207,6 @@ export interface PoseMessage {
   /** Whether the pose is part of a drag that continues. */
   dragging: boolean;
 }
-export type ToWorker = RequestMessage | ShownMessage | PoseMessage;
 
 /**
  * Event with the model's surfaces and ellipsoids, sent after a step or after a change of the data requested with each

@@ -1,5 +1,4 @@
 /** Worker of the Sculpt lab: holds the meshes and one model of them, and serves the page's requests. */
-
 import type { StepReport } from 'vesicle';
 import { send as post, VesicleError } from 'vesicle/channel';
 import { toCode } from '../../engine/code';

@@ -128,6 +128,4 @@ export interface Requests {
   exportMesh: { body: ExportRequest & { value: number }; reply: Uint8Array };
 }
 
-export type RequestKind = keyof Requests;
-export type ToWorker = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
 export type WorkerEvent = FailureEvent;

@@ -1,5 +1,4 @@
 /** Opens volumes and label maps. Used by the worker only. */
-
 import { type LengthUnit, Volume, type VolumeInit } from 'vesicle';
 import { VesicleError } from 'vesicle/channel';
 import { groupFiles } from '../../engine/file-groups';

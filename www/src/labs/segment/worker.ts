@@ -1,5 +1,4 @@
 /** Worker of the Segment lab: holds one volume, its label map and their surfaces, and serves the page's requests. */
-
 import { LabelSurfaces, type Volume } from 'vesicle';
 import { VesicleError, withTransfer } from 'vesicle/channel';
 import type { LabelArray } from '../../engine/labels';

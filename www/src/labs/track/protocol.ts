@@ -244,10 +244,6 @@ export interface Requests extends CodeRequests {
   cancelCompare: { body: undefined; reply: undefined };
 }
 
-export type RequestKind = keyof Requests;
-export type RequestMessage = { [K in RequestKind]: { id: number; kind: K; body: Requests[K]['body'] } }[RequestKind];
-export type ToWorker = RequestMessage;
-
 /** The tracked surface of a frame, with its facts and measures. */
 export interface TrackedFrame {
   surface: Surface;

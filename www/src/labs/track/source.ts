@@ -1,5 +1,4 @@
 /** Opens and prepares 4D images, and builds trackers of them. Used by the worker only. */
-
 import { SurfaceTracker, VesicleError, Volume } from 'vesicle';
 import { groupFiles } from '../../engine/file-groups';
 import { beyondSmall, MOST_VOXELS_OF_SMALL, TRACK_OF_SMALL } from '../../engine/small-files';

@@ -1,5 +1,4 @@
 /** Worker of the Track lab: holds one 4D image and one tracker, and serves the page's requests. */
-
 import type { StepReport, SurfaceTracker, Volume } from 'vesicle';
 import { send as post, VesicleError, withTransfer } from 'vesicle/channel';
 import { toCode } from '../../engine/code';
