@@ -69,9 +69,9 @@ codes! {
     EndsInFrame = "ends-in-frame",
     /// A part of the surface begins in this frame: there was no object in the image before.
     BeginsInFrame = "begins-in-frame",
-    /// The intensity step at the surface differs so much from that in the frames around it that the surface may be off.
+    /// The intensity step at the surface differs so much from that in other frames that the surface may be off.
     UnevenBrightness = "uneven-brightness",
-    /// The object is so small or thin that its volume is uncertain.
+    /// The object is so small or thin, or extends over so few thick slices, that its volume is uncertain.
     SmallObject = "small-object",
     /// The box in which the surface is tracked cuts the object.
     TouchesBox = "touches-box",

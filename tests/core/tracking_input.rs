@@ -215,6 +215,49 @@ fn a_frame_dimmed_by_less_than_a_third_has_its_volume() {
     assert_eq!(told(&tracker), []);
 }
 
+/// A ball of two slices' radius is too small in them, and told; one of four has its volume.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn objects_that_extend_over_few_thick_slices_are_told() {
+    let thick = 6.0;
+    let affine = DAffine3::from_scale(DVec3::new(1.0, 1.0, thick));
+    for slices in [2.0, 4.0] {
+        let radius = thick * slices;
+        let side = 2.0 * radius + 12.0;
+        let dims = [side as usize, side as usize, 2 * slices as usize + 5];
+        let center = DVec3::new(0.5 * side, 0.5 * side, thick * (slices + 2.2));
+        let volume = sequence(dims, 2, affine, |_, p| {
+            let parts = [-0.375, -0.125, 0.125, 0.375];
+            let at = |part: f64| DVec3::new(p.x, p.y, thick * (p.z + part));
+            parts.map(|part| brightness(&[Ball { center, radius }], at(part))).iter().sum::<f32>() * 50.0
+        });
+        let tracker = tracked(options(volume)).unwrap();
+        let ratios = [0, 1].map(|frame| tracker.volumes()[frame] / size(Ball { center, radius }));
+        println!("{slices}: {ratios:.3?} {:?}", told(&tracker));
+        let (expected, allowed): (&[_], _) =
+            if slices < 3.0 { (&[(SmallObject, 0)], 0.12) } else { (&[], 0.03) };
+        assert_eq!(told(&tracker), expected);
+        assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < allowed), "{ratios:?}");
+    }
+}
+
+/// A frame that is off by much is told of, also if it differs little from those beside it.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn a_sequence_that_fades_is_told() {
+    let radius = |t: usize| 7.0 * (1.0 - 0.12 * (0.25 * PI * t as f64).sin());
+    let volume = sequence([24; 3], 7, DAffine3::IDENTITY, |t, p| {
+        let depth = (radius(t) + 1.25 - p.distance(DVec3::splat(11.6))).clamp(0.0, 2.5);
+        (100.0 + 160.0 * depth as f32) * 0.88f32.powi(t as i32)
+    });
+    let tracker = tracked(options(volume)).unwrap();
+    let error = |t: usize| tracker.volumes()[t] / size(Ball { radius: radius(t), ..BALL }) - 1.0;
+    let errors: Vec<f64> = (0..7).map(error).collect();
+    println!("{errors:.3?} {:?}", told(&tracker));
+    assert_eq!(told(&tracker), [(UnevenBrightness, 4)]);
+    assert!(errors.iter().all(|error| error.abs() < 0.1));
+}
+
 use WarningCode::{BeginsInFrame, EndsInFrame, SmallObject, UnevenBrightness};
 
 /// The balls in each frame, the volumes expected, and the warnings.
