@@ -4,9 +4,9 @@ export type WarningCode =
   | 'ends-in-frame'
   /** A part of the surface begins in this frame: the image had no object there before. */
   | 'begins-in-frame'
-  /** An intensity step at the surface that differs so much from that in frames around it that the surface may be off. */
+  /** An intensity step at the surface that differs so much from that in other frames that the surface may be off. */
   | 'uneven-brightness'
-  /** An object so small or thin that its volume is uncertain. */
+  /** An object so small or thin, or over so few thick slices, that its volume is uncertain. */
   | 'small-object'
   /** The box in which the surface is tracked cuts the object. */
   | 'touches-box'

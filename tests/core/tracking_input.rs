@@ -245,10 +245,10 @@ fn objects_that_extend_over_few_thick_slices_are_told() {
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn a_sequence_that_fades_is_told() {
-    let radius = |t: usize| 7.0 * (1.0 - 0.12 * (0.25 * PI * t as f64).sin());
+    let radius = |t: usize| 7.0 * (1.0 - 0.12 * libm::sin(0.25 * PI * t as f64));
     let volume = sequence([24; 3], 7, DAffine3::IDENTITY, |t, p| {
         let depth = (radius(t) + 1.25 - p.distance(DVec3::splat(11.6))).clamp(0.0, 2.5);
-        (100.0 + 160.0 * depth as f32) * 0.88f32.powi(t as i32)
+        (100.0 + 160.0 * depth as f32) * (0..t).map(|_| 0.88f32).product::<f32>()
     });
     let tracker = tracked(options(volume)).unwrap();
     let error = |t: usize| tracker.volumes()[t] / size(Ball { radius: radius(t), ..BALL }) - 1.0;

@@ -329,14 +329,19 @@ impl SurfaceTracker {
         let step = |intensities: &Option<[f64; 2]>| intensities.map(|[inside, outside]| inside - outside);
         let largest = self.intensities_at_surface.iter().filter_map(step).fold(0.0, f64::max);
         let steps = self.intensities_at_surface.iter().enumerate();
-        let low = steps.filter(|(_, intensities)| step(intensities).is_some_and(|step| step < FADED * largest));
+        let low =
+            steps.filter(|(_, intensities)| step(intensities).is_some_and(|step| step < FADED * largest));
         let untold = low.filter(|(frame, _)| self.uneven_brightness(*frame).is_none());
         let text = format!(
             "the intensity step at the surface is less than {:.0} % of that in another frame, so parts of the boundary may be \
              missed, and the volume too small; equalise the brightness of the frames, or lower the edge threshold",
             100.0 * FADED
         );
-        Finding { code: WarningCode::UnevenBrightness, text, frames: untold.map(|(frame, _)| frame).collect() }
+        Finding {
+            code: WarningCode::UnevenBrightness,
+            text,
+            frames: untold.map(|(frame, _)| frame).collect(),
+        }
     }
 
     /// Returns the mean intensities at the surface `mesh` of a frame, see [`intensities_at`].
