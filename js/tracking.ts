@@ -187,9 +187,9 @@ const FRAME_SECONDS = 0.1;
  * In frames in which the image has no object where the surface was, the surface is empty; it begins again where an
  * object appears. {@link StepReport.warnings} names these frames (`ends-in-frame`, `begins-in-frame`), those in which the
  * object is too small or thin for the radius of plane fits or the thickness of slices (`small-object`), and those whose
- * intensities at the surface differ too much from other frames (`uneven-brightness`); further, those that the box cuts (`touches-box`), that have handles
- * (`handles`), with hardly a boundary (`no-boundary`), and whose volume jumps (`volume-jump`). Voxels that are NaN or negative
- * infinity are outside.
+ * intensities at the surface differ too much from other frames (`uneven-brightness`); further, those that the box cuts
+ * (`touches-box`), that have handles (`handles`), with hardly a boundary (`no-boundary`), and whose volume jumps
+ * (`volume-jump`). Voxels that are NaN or negative infinity are outside.
  *
  * @throws All methods: {@link VesicleError} `freed` after {@link SurfaceTracker.free}.
  */

@@ -19,13 +19,13 @@ const MAX_SHIFT: f64 = 0.3;
 const THIN: f64 = 0.93;
 
 /// Thickness of the object, as above, in units of the distance of slices that are [`THICK`], below which its volume is uncertain:
-/// of a ball of this thickness it is 5 % too small in slices eight pixels thick, 2 % in slices four thick.
+/// of a ball of this thickness it is 6 % too small in slices eight pixels thick, 3 % in slices four thick.
 const THIN_IN_SLICES: f64 = 1.65;
 
 /// Ratio of the longest to the shortest side of a voxel from which slices are thick.
 const THICK: f64 = 3.0;
 
-/// Ratio of the intensity step at the surface to the largest one of all frames below which the surface is uncertain: of a
+/// Ratio of the intensity step at the surface to the largest one of other frames below which the surface is uncertain: of a
 /// beating ball, blurred over 2.5 voxels, whose image fades by 15 % per frame, volumes are then 4 to 8 % too small.
 const FADED: f64 = 2.0 / 3.0;
 
@@ -128,8 +128,7 @@ impl SurfaceTracker {
             warnings.push(if is_lost { begins_anew(frame) } else { begins(frame) });
         }
         if is_there {
-            // Steps at the surface of a small object are not those of its boundary.
-            warnings.extend(self.small_object(frame).or_else(|| self.uneven_brightness(frame)));
+            warnings.extend(self.uncertain_size(frame));
             warnings.extend(self.volume_jump(frame));
         }
         warnings
@@ -307,41 +306,34 @@ impl SurfaceTracker {
         if area > 0.0 { 2.0 * volume.max(0.0) / area } else { 0.0 }
     }
 
-    /// Finds the frames in which the object extends over few thick slices, without those in which it is too small anyway.
-    fn few_slices(&self) -> Finding {
-        let Region { spacing, space, .. } = &self.region;
-        let distance = spacing.max_element() / space.scale;
-        let is_thick = spacing.max_element() >= THICK * spacing.min_element();
-        let thicknesses = THIN * self.params.radius..THIN_IN_SLICES * distance;
-        let is_thin = |frame: &usize| is_thick && thicknesses.contains(&self.thickness(*frame));
-        let text = format!(
-            "the object extends over few slices, {distance:.3} apart, so its volume is some percent too small: insert slices first"
-        );
-        Finding {
-            code: WarningCode::SmallObject,
-            text,
-            frames: (0..self.meshes.len()).filter(|frame| self.has_object(*frame)).filter(is_thin).collect(),
-        }
+    /// Returns a warning if the object is too small, or else if its brightness differs too much from that in frames nearby.
+    fn uncertain_size(&self, frame: usize) -> Option<Warning> {
+        // Steps at the surface of a small object are not those of its boundary.
+        self.small_object(frame).or_else(|| self.uneven_brightness(frame))
     }
 
-    /// Finds the frames in which the intensity step at the surface is much lower than in the brightest one.
+    /// Finds the frames in which the object extends over few thick slices, without those in which it is too small anyway.
+    fn few_slices(&self) -> Finding {
+        let [distance, pixel] =
+            [self.region.longest_side() / self.region.space.scale, self.region.shortest_side()];
+        let is_thin = |frame: &usize| self.thickness(*frame) < THIN_IN_SLICES * distance;
+        let is_told = |frame: &usize| self.small_object(*frame).is_some();
+        let frames = (0..self.meshes.len()).filter(|frame| self.has_object(*frame));
+        let frames = frames.filter(|frame| distance >= THICK * pixel && is_thin(frame) && !is_told(frame));
+        Finding { code: WarningCode::SmallObject, text: FEW_SLICES.into(), frames: frames.collect() }
+    }
+
+    /// Finds the frames in which the intensity step at the surface is much lower than in the brightest one, among those whose
+    /// steps no other warning doubts.
     fn faded(&self) -> Finding {
-        let step = |intensities: &Option<[f64; 2]>| intensities.map(|[inside, outside]| inside - outside);
-        let largest = self.intensities_at_surface.iter().filter_map(step).fold(0.0, f64::max);
-        let steps = self.intensities_at_surface.iter().enumerate();
-        let low =
-            steps.filter(|(_, intensities)| step(intensities).is_some_and(|step| step < FADED * largest));
-        let untold = low.filter(|(frame, _)| self.uneven_brightness(*frame).is_none());
-        let text = format!(
-            "the intensity step at the surface is less than {:.0} % of that in another frame, so parts of the boundary may be \
-             missed, and the volume too small; equalise the brightness of the frames, or lower the edge threshold",
-            100.0 * FADED
-        );
-        Finding {
-            code: WarningCode::UnevenBrightness,
-            text,
-            frames: untold.map(|(frame, _)| frame).collect(),
-        }
+        let steps = self.intensities_at_surface.iter().enumerate().filter_map(|(frame, intensities)| {
+            intensities.map(|[inside, outside]| (frame, inside - outside))
+        });
+        let steps: Vec<_> = steps.filter(|(frame, _)| self.uncertain_size(*frame).is_none()).collect();
+        let largest = steps.iter().map(|(_, step)| *step).fold(0.0, f64::max);
+        let low = steps.into_iter().filter(|(_, step)| *step < FADED * largest);
+        let frames = low.map(|(frame, _)| frame).collect();
+        Finding { code: WarningCode::UnevenBrightness, text: FADED_STEP.into(), frames }
     }
 
     /// Returns the mean intensities at the surface `mesh` of a frame, see [`intensities_at`].
@@ -372,6 +364,12 @@ fn intensities_at(region: &Region, frame: usize, mesh: &TriangleMesh) -> Option<
 }
 
 const CUT_BY_BOX: &str = "the box cuts the object: its volume is that within the box; use a larger box";
+
+const FEW_SLICES: &str = "the object extends over few slices, so its volume is some percent too small: insert one slice between \
+                          each two, which halves that";
+
+const FADED_STEP: &str = "the intensity step at the surface is less than two thirds of that in another frame, so the surface may \
+                          be off; equalise the brightness of the frames, or lower the edge threshold";
 
 const DIVIDED: &str = "the object is in several parts within one surface: it has divided, or another touched it before; volume \
                        and area hold what joins the parts: track them one by one, each from where it is alone";
