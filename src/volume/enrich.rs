@@ -1,4 +1,4 @@
-//! Interpolation of further slices in volumes with thick slices, so that the spacing becomes nearly isotropic (dynamic
+//! Interpolation of further slices in volumes with thick slices, so that shapes vary less from slice to slice (dynamic
 //! surfaces from 4D cardiac MRI, section 5.2).
 
 use super::derived::Derivation;
@@ -24,6 +24,15 @@ pub enum Enrichment {
 /// add no information.
 const MAX_FACTOR: usize = 16;
 
+/// The most pixels that slices are apart once [`Volume::enrich_slices`] has chosen the factor itself: twice a pixel, and a
+/// little more for spacings that are rounded. The tracker's planes bridge that without reaching further than pixels ask.
+const MOST_APART: f64 = 2.1;
+
+/// The largest factor that [`Volume::enrich_slices`] chooses itself. An interpolated edge across the slices is a ramp
+/// from slice to slice; one longer than the tracker's windows holds a boundary at any level, and balls come out up to a
+/// sixth too large, with handles.
+const MAX_CHOSEN_FACTOR: f64 = 3.0;
+
 /// The most memory that the result and the images between two slices may take, in bytes. A whole body in slices of 3 mm,
 /// enriched to the size of its pixels, takes less; beside a larger one there is no memory to work with it.
 const MOST_BYTES: u64 = 1 << 30;
@@ -43,8 +52,8 @@ impl Volume {
     /// of the largest spacing.
     ///
     /// The original slices are unchanged and keep their world positions; the numeric type is kept. If `factor` is
-    /// `None`, it is the ratio of the largest spacing to the mean of the two others, rounded and limited to 1..=16; 1
-    /// changes nothing. Each frame is interpolated separately.
+    /// `None`, it is the smallest that brings slices to about twice as far apart as pixels, at most 3: the one that tracks
+    /// best; 1 changes nothing. Each frame is interpolated separately.
     ///
     /// # Errors
     /// `factor` not in 1..=16; a single slice along that axis with a factor above 1; [`VolumeError::TooLarge`], also if that
@@ -65,7 +74,7 @@ impl Volume {
         pauses: &Pauses,
     ) -> Result<Volume, VolumeError> {
         let axis = self.thick_axis();
-        let factor = factor.unwrap_or_else(|| self.isotropic_factor(axis));
+        let factor = factor.unwrap_or_else(|| self.chosen_factor(axis));
         if !(1..=MAX_FACTOR).contains(&factor) {
             let problem = format!("must be 1 to {MAX_FACTOR}, got {factor}");
             return Err(VolumeError::invalid("factor", problem));
@@ -124,11 +133,11 @@ impl Volume {
         (0..3).fold(2, |axis, other| if spacing[other] > spacing[axis] { other } else { axis })
     }
 
-    fn isotropic_factor(&self, axis: usize) -> usize {
+    fn chosen_factor(&self, axis: usize) -> usize {
         let spacing = self.spacing();
-        let others = (spacing[(axis + 1) % 3] + spacing[(axis + 2) % 3]) / 2.0;
-        let factor = (spacing[axis] / others).round();
-        if self.dims[axis] < 2 || factor < 1.0 { 1 } else { factor.min(MAX_FACTOR as f64) as usize }
+        let pixel = (spacing[(axis + 1) % 3] + spacing[(axis + 2) % 3]) / 2.0;
+        let factor = (spacing[axis] / (MOST_APART * pixel)).ceil();
+        if self.dims[axis] < 2 { 1 } else { factor.clamp(1.0, MAX_CHOSEN_FACTOR) as usize }
     }
 
     /// Stores one frame in `voxels`, those of the result, with `factor` − 1 slices interpolated between each pair of
@@ -314,10 +323,12 @@ mod tests {
     }
 
     #[test]
-    fn the_factor_left_out_brings_the_voxels_near_to_cubes() {
-        assert_eq!(cone_volume(1).enrich_slices(None, Enrichment::Flow).unwrap().dims()[2], 25);
-        let cubes = volume([4, 4, 4, 1], [1.0, 1.0, 1.2], Voxels::I16((0..64).collect()));
-        assert_eq!(cubes.enrich_slices(None, Enrichment::Flow).unwrap().voxels(), cubes.voxels());
+    fn the_factor_left_out_brings_slices_to_twice_a_pixel_apart_and_is_at_most_three() {
+        assert_eq!(cone_volume(1).enrich_slices(None, Enrichment::Flow).unwrap().dims()[2], 13);
+        for (spacing, slices) in [(1.2, 4), (2.0 + 1e-7, 4), (2.2, 7), (4.0, 7), (4.3, 10), (8.0, 10), (30.0, 10)] {
+            let given = volume([4, 4, 4, 1], [1.0, 1.0, spacing], Voxels::I16((0..64).collect()));
+            assert_eq!(given.enrich_slices(None, Enrichment::Flow).unwrap().dims()[2], slices, "{spacing}");
+        }
     }
 
     #[test]
@@ -359,7 +370,7 @@ mod tests {
     fn results_without_memory_to_work_with_them_are_refused_at_once() {
         let volume = volume([300, 300, 1200, 1], [1.0, 1.0, 16.0], Voxels::U8(vec![1; 300 * 300 * 1200]));
         let bytes = 300 * 300 * (1199 * 16 + 1 + 40);
-        let error = volume.enrich_slices(None, Enrichment::Linear).unwrap_err();
+        let error = volume.enrich_slices(Some(16), Enrichment::Linear).map(drop).unwrap_err();
         assert_eq!(error, VolumeError::TooLarge { bytes });
     }
 

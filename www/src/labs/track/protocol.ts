@@ -58,8 +58,8 @@ export interface Preparation {
   binning: 1 | 2;
   enrichment: Enrichment;
   /**
-   * Factor by which inserted slices divide the distance between slices; 0 chooses the integer that makes voxels most
-   * nearly cubic.
+   * Factor by which inserted slices divide the distance between slices; 0 chooses the smallest that brings slices to
+   * about twice as far apart as pixels, at most 3.
    */
   factor: number;
 }

@@ -59,8 +59,9 @@ export function inWords(error: unknown): unknown {
   return isTooLarge ? new VesicleError(error.code, text('track.tooLarge')) : error;
 }
 
-/** The largest factor by which the library multiplies slices. */
-const MOST_SLICES = 16;
+/** The most pixels that slices are apart once the library has chosen the factor itself, and its largest choice. */
+const MOST_APART = 2.1;
+const MAX_CHOSEN_FACTOR = 3;
 
 /** Throws a `VesicleError` if small files would become an image that is too large for the memory of a page. */
 export function checkSmall(
@@ -69,9 +70,10 @@ export function checkSmall(
 ): void {
   if (!enriches(preparation)) return;
   const [finest, middle, thickest] = [...spacing].sort((a, b) => a - b) as [number, number, number];
-  const factor =
-    preparation.factor || Math.min(MOST_SLICES, Math.max(1, Math.round(thickest / ((finest + middle) / 2))));
-  const voxels = (dims[0] * dims[1] * dims[2] * frames * factor) / preparation.binning ** 2;
+  const { binning } = preparation;
+  const apart = thickest / ((binning * (finest + middle)) / 2);
+  const factor = preparation.factor || Math.min(MAX_CHOSEN_FACTOR, Math.max(1, Math.ceil(apart / MOST_APART)));
+  const voxels = (dims[0] * dims[1] * dims[2] * frames * factor) / binning ** 2;
   if (voxels <= MOST_VOXELS_OF_SMALL) return;
   throw new VesicleError('too-large', beyondSmall('track.smallTooLarge', voxels, MOST_VOXELS_OF_SMALL));
 }
