@@ -325,7 +325,9 @@ mod tests {
     #[test]
     fn the_factor_left_out_brings_slices_to_twice_a_pixel_apart_and_is_at_most_three() {
         assert_eq!(cone_volume(1).enrich_slices(None, Enrichment::Flow).unwrap().dims()[2], 13);
-        for (spacing, slices) in [(1.2, 4), (2.0 + 1e-7, 4), (2.2, 7), (4.0, 7), (4.3, 10), (8.0, 10), (30.0, 10)] {
+        for (spacing, slices) in
+            [(1.2, 4), (2.0 + 1e-7, 4), (2.2, 7), (4.0, 7), (4.3, 10), (8.0, 10), (30.0, 10)]
+        {
             let given = volume([4, 4, 4, 1], [1.0, 1.0, spacing], Voxels::I16((0..64).collect()));
             assert_eq!(given.enrich_slices(None, Enrichment::Flow).unwrap().dims()[2], slices, "{spacing}");
         }
