@@ -10,7 +10,7 @@ use vesicle::methods::MethodError;
 use vesicle::methods::tracking::{
     Bounds, Cavity, Component, Query, SurfaceTracker, TrackingLimits, TrackingOptions, TrackingParams,
 };
-use vesicle::volume::{Volume, VolumeError, VolumeInit, Voxels};
+use vesicle::volume::{Enrichment, Volume, VolumeError, VolumeInit, Voxels};
 use vesicle::warning::{Place, WarningCode};
 #[cfg(target_arch = "wasm32")]
 use wasm_bindgen_test::wasm_bindgen_test as test;
@@ -215,30 +215,45 @@ fn a_frame_dimmed_by_less_than_a_third_has_its_volume() {
     assert_eq!(told(&tracker), []);
 }
 
+/// Returns a sequence of a ball in slices that are six pixels apart and as thick, its radius given in slices, and the ball.
+fn ball_in_slices(slices: f64) -> (Volume, Ball) {
+    let thick = 6.0;
+    let radius = thick * slices;
+    let side = 2.0 * radius + 12.0;
+    let dims = [side as usize, side as usize, 2 * slices as usize + 5];
+    let ball = Ball { center: DVec3::new(0.5 * side, 0.5 * side, thick * (slices + 2.2)), radius };
+    let volume = sequence(dims, 2, DAffine3::from_scale(DVec3::new(1.0, 1.0, thick)), |_, p| {
+        let parts = [-0.375, -0.125, 0.125, 0.375];
+        let at = |part: f64| DVec3::new(p.x, p.y, thick * (p.z + part));
+        parts.map(|part| brightness(&[ball], at(part))).iter().sum::<f32>() * 50.0
+    });
+    (volume, ball)
+}
+
 /// A ball of two slices' radius is too small in them, and told; one of four has its volume.
 #[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
 #[test]
 fn objects_that_extend_over_few_thick_slices_are_told() {
-    let thick = 6.0;
-    let affine = DAffine3::from_scale(DVec3::new(1.0, 1.0, thick));
     for slices in [2.0, 4.0] {
-        let radius = thick * slices;
-        let side = 2.0 * radius + 12.0;
-        let dims = [side as usize, side as usize, 2 * slices as usize + 5];
-        let center = DVec3::new(0.5 * side, 0.5 * side, thick * (slices + 2.2));
-        let volume = sequence(dims, 2, affine, |_, p| {
-            let parts = [-0.375, -0.125, 0.125, 0.375];
-            let at = |part: f64| DVec3::new(p.x, p.y, thick * (p.z + part));
-            parts.map(|part| brightness(&[Ball { center, radius }], at(part))).iter().sum::<f32>() * 50.0
-        });
+        let (volume, ball) = ball_in_slices(slices);
         let tracker = tracked(options(volume)).unwrap();
-        let ratios = [0, 1].map(|frame| tracker.volumes()[frame] / size(Ball { center, radius }));
+        let ratios = [0, 1].map(|frame| tracker.volumes()[frame] / size(ball));
         println!("{slices}: {ratios:.3?} {:?}", told(&tracker));
         let (expected, allowed): (&[_], _) =
             if slices < 3.0 { (&[(SmallObject, 0)], 0.12) } else { (&[], 0.03) };
         assert_eq!(told(&tracker), expected);
         assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < allowed), "{ratios:?}");
     }
+}
+
+/// As many slices as make voxels cubes would make the ball too large.
+#[cfg_attr(target_arch = "wasm32", ignore = "slow in wasm: npm run test:all")]
+#[test]
+fn slices_inserted_by_default_bring_a_small_ball_near_to_its_volume() {
+    let (volume, ball) = ball_in_slices(2.0);
+    let tracker = tracked(options(volume.enrich_slices(None, Enrichment::Flow).unwrap())).unwrap();
+    let ratios = [0, 1].map(|frame| tracker.volumes()[frame] / size(ball));
+    assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.02), "{ratios:?}");
 }
 
 /// A frame that is off by much is told of, also if it differs little from those beside it.
