@@ -318,17 +318,18 @@ describe('images', () => {
 
   test('of small files are refused where slices between would take the memory of the page', () => {
     const image = { dims: [400, 400, 50] as [number, number, number], frames: 2 };
-    const thick = { ...image, spacing: [1, 1, 16] as [number, number, number] };
+    const thick = { ...image, frames: 5, spacing: [1, 1, 16] as [number, number, number] };
     const flow = { binning: 1, enrichment: 'flow', factor: 0 } as const;
-    const message = 'the image would have 256 million voxels; files of at most 128 KiB may have 67 million.';
-    expect(() => checkSmall(thick, flow)).toThrow(message);
+    const message = 'the image would have 120 million voxels; files of at most 128 KiB may have 67 million.';
+    for (const preparation of [flow, { ...flow, factor: 3 }])
+      expect(() => checkSmall(thick, preparation)).toThrow(message);
     for (const preparation of [
       { ...flow, binning: 2 },
-      { ...flow, factor: 2 },
+      { ...flow, factor: 1 },
       { ...flow, enrichment: 'none' },
     ] as const)
       checkSmall(thick, preparation);
-    checkSmall({ ...image, spacing: [1, 1, 3] }, flow);
+    checkSmall({ ...thick, spacing: [1, 1, 2] }, flow);
   });
 
   test('are binned and enriched with slices as requested', async () => {

@@ -352,9 +352,11 @@ class Walk {
   }
 
   async #finish(): Promise<void> {
-    const play = this.page.locator('.transport .play:enabled');
-    if ((await this.page.getAttribute('#lab', 'data-state')) === 'paused' && (await play.count()) > 0)
-      await play.click();
+    // At once, as the lab may go on by itself between a look and a click.
+    await this.page.evaluate(() => {
+      const isPaused = document.querySelector('#lab')?.getAttribute('data-state') === 'paused';
+      if (isPaused) document.querySelector<HTMLButtonElement>('.transport .play:enabled')?.click();
+    });
     await quiet(this.page);
   }
 
