@@ -85,7 +85,7 @@ export interface MultiresOptions {
   /**
    * The support of the surface. `'surface'`, the default for a `detail` without `base`: `detail` holds itself; whatever
    * closed surface it is, it stays exactly as given, except where ellipsoids are moved, turned or stretched. What one does
-   * fades with the distance along the surface, and leaves more than half of its area as it is. An ellipsoid stops where the
+   * fades with the distance along the surface, and leaves about half of its area as it is. An ellipsoid stops where the
    * surface would fold up, and becomes its own target there (warning `handle-stopped`). Components that intersect as given
    * may go on to (warning `self-intersecting`). Of the parameters, only `edgeMin` and `edgeMax` have an effect.
    * `'membrane'`, the default otherwise: a membrane over the ellipsoids, as in the paper.
@@ -241,7 +241,8 @@ export class MultiresolutionModel implements Stepper {
 
   /**
    * Sets new targets for the control ellipsoids, matched by index; each step moves, rotates and resizes them by a
-   * limited amount, their centres by at most half of their shortest semi-axis (or of their target's, if longer).
+   * limited amount, with `'membrane'` their centres by at most half of their shortest semi-axis (or of their target's, if
+   * longer).
    * Additional ellipsoids grow from a fraction of their size, or out of the nearest existing one if they lie outside
    * the surface; those omitted shrink and vanish.
    *

@@ -365,7 +365,7 @@ fn intensities_at(region: &Region, frame: usize, mesh: &TriangleMesh) -> Option<
 
 const CUT_BY_BOX: &str = "the box cuts the object: its volume is that within the box; use a larger box";
 
-const FEW_SLICES: &str = "the object extends over few slices, so its volume is some percent too small: insert slices between \
+const FEW_SLICES: &str = "the object extends over few slices, so its volume is some percent off: insert slices between \
                           them, which halves that";
 
 const FADED_STEP: &str = "the intensity step at the surface is less than two thirds of that in another frame, so the surface may \
