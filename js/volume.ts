@@ -337,7 +337,7 @@ export class Volume {
    *
    * @param options - `factor`: number by which the distance between slices is divided, 1 to 16; default the
    *   smallest that brings slices to about twice as far apart as pixels, at most 3; 1 changes nothing. More make
-   *   surfaces no truer. `method`: `'linear'` interpolates linearly instead.
+   *   surfaces no more accurate. `method`: `'linear'` interpolates linearly instead.
    * @throws {@link VesicleError} `invalid-argument`: factor out of range, or a single slice; `too-large`.
    */
   enrichSlices(options: { factor?: number; method?: 'flow' | 'linear' } = {}): Volume {

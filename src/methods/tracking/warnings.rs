@@ -323,8 +323,8 @@ impl SurfaceTracker {
         Finding { code: WarningCode::SmallObject, text: FEW_SLICES.into(), frames: frames.collect() }
     }
 
-    /// Finds the frames in which the intensity step at the surface is much lower than in the brightest one, among those whose
-    /// steps no other warning doubts.
+    /// Finds the frames in which the intensity step at the surface is much lower than the highest step. Frames with a warning
+    /// about their size or brightness are left out: their step is not that of the object's boundary.
     fn faded(&self) -> Finding {
         let steps = self.intensities_at_surface.iter().enumerate().filter_map(|(frame, intensities)| {
             intensities.map(|[inside, outside]| (frame, inside - outside))
