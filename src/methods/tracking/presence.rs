@@ -42,6 +42,11 @@ const KNOWN: f64 = 0.25;
 /// extracted from the frame. Where windows reach, hardly any fail; of those of a chest, a third fail in all frames.
 const MORE_REJECTED: f64 = 0.1;
 
+/// Mean distance between a tracked surface and one extracted from the same frame, in units of the shortest side of a
+/// voxel, below which they are the same. A tenth of the surface, see [`MORE_REJECTED`], is further than that apart on
+/// average where it is beyond the windows.
+const APART: f64 = 0.1;
+
 /// The result of tracking a surface into a frame.
 pub(super) struct Tracked {
     pub mesh: Mesh,
@@ -108,7 +113,7 @@ impl SurfaceTracker {
     }
 
     /// Returns the surface extracted from a frame where one was tracked into it, if many of the projections of that one fail,
-    /// since it moved further than the windows reach, and far fewer of those of the extracted one.
+    /// since it moved further than the windows reach, far fewer of those of the extracted one, and the two are apart.
     ///
     /// # Errors
     /// [`MethodError::Mesh`] and [`MethodError::Volume`] if memory does not suffice.
@@ -137,7 +142,18 @@ impl SurfaceTracker {
         let Some((_, part)) = best else { return Ok(None) };
         let found = self.begun_at(&part, frame, &self.voting, pauses).await?;
         let is_better = found.is_present && rejected_share(&found.statistics, passes) < 0.5 * now;
-        Ok(is_better.then_some(found))
+        // Predicted to the right place, but held there by nothing, a surface could leave it in the next frame.
+        let is_held = now < UNCERTAIN && self.is_where(&inside, &found);
+        Ok((is_better && !is_held).then_some(found))
+    }
+
+    /// Returns whether a surface that encloses the voxels `inside` is hardly anywhere apart from `other`: then what it
+    /// bounds did not move away from it.
+    fn is_where(&self, inside: &FixedBitSet, other: &Tracked) -> bool {
+        let spacing = self.region.spacing;
+        let differing =
+            inside.symmetric_difference(&inside_voxels(&self.region, &other.mesh.to_triangles())).count();
+        differing as f64 * spacing.element_product() < APART * spacing.min_element() * other.statistics.area
     }
 
     /// Returns the frame before `frame` in which the surface began that was tracked up to `frame`; `None` if there is none.
