@@ -142,18 +142,13 @@ impl SurfaceTracker {
         let Some((_, part)) = best else { return Ok(None) };
         let found = self.begun_at(&part, frame, &self.voting, pauses).await?;
         let is_better = found.is_present && rejected_share(&found.statistics, passes) < 0.5 * now;
+        if !is_better {
+            return Ok(None);
+        }
+        pauses.now().await;
         // Predicted to the right place, but held there by nothing, a surface could leave it in the next frame.
-        let is_held = now < UNCERTAIN && self.is_where(&inside, &found);
-        Ok((is_better && !is_held).then_some(found))
-    }
-
-    /// Returns whether a surface that encloses the voxels `inside` is hardly anywhere apart from `other`: then what it
-    /// bounds did not move away from it.
-    fn is_where(&self, inside: &FixedBitSet, other: &Tracked) -> bool {
-        let spacing = self.region.spacing;
-        let differing =
-            inside.symmetric_difference(&inside_voxels(&self.region, &other.mesh.to_triangles())).count();
-        differing as f64 * spacing.element_product() < APART * spacing.min_element() * other.statistics.area
+        let is_held = now < UNCERTAIN && mean_distance(&self.region, &inside, &found) < APART;
+        Ok((!is_held).then_some(found))
     }
 
     /// Returns the frame before `frame` in which the surface began that was tracked up to `frame`; `None` if there is none.
@@ -299,6 +294,14 @@ impl SurfaceTracker {
 fn rejected_share(statistics: &FrameStatistics, passes: f64) -> f64 {
     // Closed meshes have about twice as many triangles as vertices.
     2.0 * statistics.rejected as f64 / (passes * statistics.triangles.max(1) as f64)
+}
+
+/// Returns the mean distance between `surface` and one that encloses the voxels `inside`, in units of the shortest side of
+/// a voxel: the volume between them by area.
+fn mean_distance(region: &Region, inside: &FixedBitSet, surface: &Tracked) -> f64 {
+    let differing = inside.symmetric_difference(&inside_voxels(region, &surface.mesh.to_triangles())).count();
+    differing as f64 * region.spacing.element_product()
+        / (surface.statistics.area * region.spacing.min_element())
 }
 
 /// Returns the voxels of the region whose centres are inside a surface, given in the working space.
