@@ -32,6 +32,7 @@ export {
   type MeshInfo,
   type MeshInSlices,
   type MeshReport,
+  type MeshSnapshot,
   type PositionOptions,
   type RestructurePass,
   type SurfaceDistance,

@@ -36,6 +36,7 @@ import {
   sayingHow,
   stated,
 } from './mesh-file.js';
+import { copyWithRoom, roomFor } from './room.js';
 import { call, Handle } from './runtime.js';
 import { isOfSmall, limitOf, MOST_TRIANGLES_OF_SMALL } from './small-files.js';
 import { checkedSlices, finishInSlices, type SliceOptions } from './stepper.js';
@@ -64,6 +65,19 @@ export interface MeshArrays {
   uvs?: Float32Array;
   /** Colour of each vertex, packed rgb, 0..1, if the mesh has colours. */
   colors?: Float32Array;
+}
+
+/**
+ * The state of a mesh at one moment, for drawing: arrays that may be longer than what they hold, so that the next one fits
+ * into the same buffers of the GPU; see {@link Mesh.snapshot}.
+ */
+export interface MeshSnapshot extends MeshArrays {
+  /** Number of vertices in the arrays. */
+  vertices: number;
+  /** Number of triangles in `indices`. */
+  triangles: number;
+  /** The origin in world space that `positions` are relative to: that of world space unless asked for. */
+  origin: Vec3;
 }
 
 /**
@@ -479,7 +493,7 @@ export class Mesh {
    */
   copyTo(out: MeshArrays, options?: PositionOptions): { vertices: number; triangles: number } {
     if (out === undefined) throw invalid('out', 'must be an object with positions, normals and indices, got undefined');
-    checkProperties('out', out, ['positions', 'origin', 'normals', 'indices', 'uvs', 'colors']);
+    checkProperties('out', out, ARRAY_PROPERTIES);
     const relative = isRelative(options);
     const arrays = this.#handle.use((raw) => raw.arrays(relative));
     try {
@@ -487,6 +501,26 @@ export class Mesh {
       if (relative) out.origin = this.origin;
       else delete out.origin;
       return counts;
+    } finally {
+      arrays.free();
+    }
+  }
+
+  /**
+   * Copies the mesh for drawing, into arrays with spare capacity: their lengths grow in steps of a quarter, so that a
+   * changing mesh mostly fits into the arrays of `reuse`, and into the same buffers of the GPU. `ThreeSurface` of
+   * `vesicle/three` draws a snapshot without another copy.
+   *
+   * @param reuse - A snapshot that is drawn no more, whose arrays are used again if they are long enough, and not four
+   *   times too long; with `vesicle/worker`, they are transferred to the worker and back.
+   * @throws {@link VesicleError} `invalid-argument` if `reuse` is no such object; `precision` as {@link Mesh.arrays}.
+   */
+  snapshot(reuse: Partial<MeshSnapshot> = {}, options?: PositionOptions): MeshSnapshot {
+    const given = checkProperties('reuse', reuse, SNAPSHOT_PROPERTIES);
+    const relative = isRelative(options);
+    const arrays = this.#handle.use((raw) => raw.arrays(relative));
+    try {
+      return { ...call(() => snapshotOf(arrays, given)), origin: relative ? this.origin : [0, 0, 0] };
     } finally {
       arrays.free();
     }
@@ -1033,6 +1067,11 @@ function inFrame(warnings: readonly Warning[], frame: number): Warning[] {
   return warnings.filter(({ where }) => !where || !('frame' in where) || where.frame === frame);
 }
 
+/** Properties of {@link MeshArrays}. */
+const ARRAY_PROPERTIES = ['positions', 'origin', 'normals', 'indices', 'uvs', 'colors'] as const;
+/** Properties of a {@link MeshSnapshot}. */
+const SNAPSHOT_PROPERTIES = [...ARRAY_PROPERTIES, 'vertices', 'triangles'] as const;
+
 /** Arrays of a {@link MeshExtra}: name, and how many numbers they have per vertex or per triangle. */
 const EXTRA_ARRAYS = [
   ['normals', 3, 'vertex'],
@@ -1071,9 +1110,9 @@ function nonZero(parameter: string, vector: Float64Array<ArrayBuffer>): Float64A
 function copyArrays(from: RawArrays, out: MeshArrays): { vertices: number; triangles: number } {
   const vertices = from.vertices();
   const triangles = from.triangles();
-  out.positions = roomFor(out.positions, 3 * vertices, Float32Array);
-  out.normals = roomFor(out.normals, 3 * vertices, Float32Array);
-  out.indices = roomFor(out.indices, 3 * triangles, Uint32Array);
+  out.positions = longEnough(out.positions, 3 * vertices, Float32Array);
+  out.normals = longEnough(out.normals, 3 * vertices, Float32Array);
+  out.indices = longEnough(out.indices, 3 * triangles, Uint32Array);
   from.positions(out.positions);
   from.normals(out.normals);
   from.indices(out.indices);
@@ -1082,8 +1121,29 @@ function copyArrays(from: RawArrays, out: MeshArrays): { vertices: number; trian
   return { vertices, triangles };
 }
 
-function roomFor<T extends Float32Array | Uint32Array>(array: T, length: number, kind: new (length: number) => T): T {
+function longEnough<T extends Float32Array | Uint32Array>(
+  array: T,
+  length: number,
+  kind: new (length: number) => T,
+): T {
   return array instanceof kind && array.length >= length ? array : new kind(length);
+}
+
+function snapshotOf(from: RawArrays, reuse: Partial<MeshArrays>): Omit<MeshSnapshot, 'origin'> {
+  const vertices = from.vertices();
+  const triangles = from.triangles();
+  const positions = roomFor(reuse.positions, vertices, 3, Float32Array);
+  const normals = roomFor(reuse.normals, vertices, 3, Float32Array);
+  const indices = roomFor(reuse.indices, triangles, 3, Uint32Array);
+  from.positions(positions);
+  from.normals(normals);
+  from.indices(indices);
+  const [uvs, colors] = [from.uvs(), from.colors()];
+  return {
+    ...{ positions, normals, indices, vertices, triangles },
+    ...(uvs && { uvs: copyWithRoom(reuse.uvs, uvs, 2, Float32Array) }),
+    ...(colors && { colors: copyWithRoom(reuse.colors, colors, 3, Float32Array) }),
+  };
 }
 
 function copyExtra(out: MeshArrays, name: 'uvs' | 'colors', values: Float32Array | undefined): void {

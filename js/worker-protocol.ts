@@ -114,6 +114,7 @@ export const MEMBERS: { readonly [N in ClassName]: Members<Library[N]['prototype
     warnings: 'value',
     arrays: 'method',
     copyTo: 'method',
+    snapshot: 'method',
     info: 'method',
     check: 'method',
     splitAtSeams: 'method',

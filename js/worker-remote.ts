@@ -4,7 +4,7 @@ import { checkProperties, invalid } from './check.js';
 import { type CoverageOptions, checkedCoverage } from './coverage.js';
 import { VesicleError } from './error.js';
 import { mark } from './kind.js';
-import type { MeshArrays, PositionOptions } from './mesh.js';
+import type { MeshArrays, MeshSnapshot, PositionOptions } from './mesh.js';
 import { checkedRun, checkedSlices, type RunOptions, type SliceOptions } from './stepper.js';
 import {
   type Connection,
@@ -211,10 +211,11 @@ interface Extras {
   slices?: SliceOptions;
 }
 
+const ARRAYS = ['positions', 'origin', 'normals', 'indices', 'uvs', 'colors'] as const;
+
 /** Implements `Mesh.copyTo`: the buffers of `out` are transferred to the worker and back. */
 async function copyTo(remote: Remote, out: MeshArrays, options?: PositionOptions): Promise<unknown> {
-  const known = ['positions', 'origin', 'normals', 'indices', 'uvs', 'colors'];
-  const { uvs, colors, origin: _, ...given } = checkProperties('out', out, known);
+  const { uvs, colors, origin: _, ...given } = checkProperties('out', out, ARRAYS);
   const connection = connectionOf(remote);
   const sent = serialize([transfer({ ...given, ...(uvs && { uvs }), ...(colors && { colors }) }), options]);
   const call = { on: referenceOf(remote), name: 'copyTo', args: sent.args };
@@ -225,6 +226,16 @@ async function copyTo(remote: Remote, out: MeshArrays, options?: PositionOptions
   const { counts, arrays } = (await answer) as { counts: unknown; arrays: MeshArrays };
   Object.assign(out, arrays);
   return counts;
+}
+
+/** Implements `Mesh.snapshot`: the buffers of `reuse` are transferred to the worker and back. */
+async function snapshot(
+  remote: Remote,
+  reuse: Partial<MeshSnapshot> = {},
+  options?: PositionOptions,
+): Promise<unknown> {
+  const given = checkProperties('reuse', reuse, [...ARRAYS, 'vertices', 'triangles']);
+  return post(remote, 'snapshot', [transfer({ ...given }), options]);
 }
 
 /** Id of the object that was requested last. */
@@ -282,7 +293,12 @@ function inSlices(remote: Remote, operations: object, options?: SliceOptions): R
   return Object.fromEntries(Object.keys(operations).map(operation));
 }
 
-const SPECIAL: Record<string, (remote: Remote, ...args: never[]) => Promise<unknown>> = { run, coverage, copyTo };
+const SPECIAL: Record<string, (remote: Remote, ...args: never[]) => Promise<unknown>> = {
+  run,
+  coverage,
+  copyTo,
+  snapshot,
+};
 
 function memberOf(of: ClassName, name: string, kind: string): PropertyDescriptor {
   const special = Object.hasOwn(SPECIAL, name) ? SPECIAL[name] : undefined;

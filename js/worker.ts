@@ -32,7 +32,8 @@
  *
  * **Arrays.** Typed arrays are copied, once; {@link transfer} transfers them instead. Those of results are transferred
  * by the worker. `mesh.copyTo(out)` transfers the buffers of `out` there and back: `out` has empty arrays until the
- * promise resolves, and then new arrays over the same memory where it was large enough.
+ * promise resolves, and then new arrays over the same memory where it was large enough. So does `mesh.snapshot(reuse)` with
+ * those of `reuse`, which is drawn no more.
  *
  * **Errors.** A {@link VesicleError} has its code. After a {@link VesicleCrash}, or if the worker ended by itself (also
  * a `VesicleCrash`), all pending and later promises reject, until `init` starts a new worker; objects created before
@@ -78,6 +79,7 @@ export type {
   MeshHit,
   MeshInfo,
   MeshReport,
+  MeshSnapshot,
   MeshTexture,
   ModuleOptions,
   MultiresParams,

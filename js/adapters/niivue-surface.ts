@@ -5,7 +5,7 @@ import { VesicleError } from '../error.js';
 import type { MeshArrays } from '../mesh.js';
 import type { Warning } from '../warning.js';
 import { Outline, type Outlines, outlinesOf } from './niivue-outline.js';
-import { bounds, MeshReader, type MeshSource, type RemoteMeshSource, type SurfaceArrays } from './source.js';
+import { type AnyMesh, bounds, MeshReader, type SurfaceArrays } from './source.js';
 
 /** The members of NiiVue's class `Niivue` (`NiiVueGPU` in 1.0) that {@link NiivueSurface} uses. */
 export interface Niivue {
@@ -121,7 +121,7 @@ export class NiivueSurface {
    * @throws `VesicleError` `invalid-argument`: no mesh; `precision`: a mesh so far from the origin that single precision
    *   is too coarse there, unless it may be recentred and NiiVue has no volume as far away. What was shown stays.
    */
-  async update(mesh: MeshSource | RemoteMeshSource): Promise<boolean> {
+  async update(mesh: AnyMesh): Promise<boolean> {
     const read = this.#reader.readOrFetch(mesh);
     const frame = read instanceof Promise ? await read : read;
     if (!frame) return false;

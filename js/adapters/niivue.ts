@@ -12,7 +12,7 @@ import { affineOf, voxels } from './source.js';
 
 export { type DrawingOptions, type FollowedDrawing, followDrawing } from './niivue-drawing.js';
 export { type Niivue, NiivueSurface, type NiivueSurfaceOptions, type NVMeshClass } from './niivue-surface.js';
-export type { MeshSource, RemoteMeshSource } from './source.js';
+export type { AnyMesh, MeshSource, RemoteMeshSource } from './source.js';
 
 /** The properties of a NiiVue volume, such as `nv.volumes[0]`, that {@link volumeFromNiivue} reads. */
 export interface NiivueVolume {

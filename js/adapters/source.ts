@@ -3,7 +3,8 @@ import { choice, invalid } from '../check.js';
 import type { Space, Vec3, VolumeInit, VoxelArray } from '../data.js';
 import { VesicleError } from '../error.js';
 import { isProxy, notA } from '../kind.js';
-import type { MeshArrays, PositionOptions } from '../mesh.js';
+import type { MeshArrays, MeshSnapshot, PositionOptions } from '../mesh.js';
+import { copyWithRoom } from '../room.js';
 import type { Warning } from '../warning.js';
 
 /**
@@ -27,6 +28,8 @@ export interface MeshSource {
    * vertices and triangles written; used instead of `arrays` if present.
    */
   copyTo?(out: MeshArrays, options?: PositionOptions): { vertices: number; triangles: number };
+  /** Copies the surface into arrays with spare capacity, those of `reuse` if they fit; used instead of both if present. */
+  snapshot?(reuse: Partial<MeshSnapshot>, options?: PositionOptions): MeshSnapshot;
 }
 
 /** A changing surface in a worker that an adapter can show: a `Mesh` of `vesicle/worker`, or the `mesh` of a model there. */
@@ -39,12 +42,22 @@ export interface RemoteMeshSource {
   readonly warnings?: Promise<readonly Warning[]>;
   /** Resolves with the surface in its present state, as that of a {@link MeshSource}. */
   arrays(options?: PositionOptions): Promise<MeshArrays>;
+  /** Resolves with the surface as that of a {@link MeshSource}; used instead of `arrays` if present. */
+  snapshot?(reuse: Partial<MeshSnapshot>, options?: PositionOptions): Promise<MeshSnapshot>;
 }
 
+/** A surface that an adapter shows: one that changes, here or in a worker, or a snapshot of it, whose arrays become the adapter's. */
+export type AnyMesh = MeshSource | MeshSnapshot | RemoteMeshSource;
+
 /** Returns whether a surface is in a worker. */
-function isRemote(mesh: MeshSource | RemoteMeshSource): mesh is RemoteMeshSource {
+function isRemote(mesh: AnyMesh): mesh is RemoteMeshSource {
   // Each property of a proxy that is read is a request.
   return isProxy(mesh) || Object(mesh).topologyVersion instanceof Promise;
+}
+
+/** Returns whether a surface is a snapshot, which has arrays where a mesh has methods. */
+function isSnapshot(mesh: MeshSource | MeshSnapshot): mesh is MeshSnapshot {
+  return Object(mesh).positions instanceof Float32Array;
 }
 
 /**
@@ -56,7 +69,15 @@ export interface SurfaceArrays extends MeshArrays {
   origin: Vec3;
   /** Whether the connectivity has changed since the last read, or no or another mesh was read then. */
   topology: boolean;
+  /** The same arrays with their spare capacity. */
+  room: MeshArrays;
 }
+
+const noArrays = (): MeshArrays => ({
+  positions: new Float32Array(),
+  normals: new Float32Array(),
+  indices: new Uint32Array(),
+});
 
 /**
  * Reads a mesh if it has changed since the last read, and converts it to the world space of the host (NiiVue, three.js
@@ -65,7 +86,10 @@ export interface SurfaceArrays extends MeshArrays {
 export class MeshReader {
   readonly #rotated: boolean;
   readonly #remedy: string | undefined;
-  #arrays: MeshArrays = { positions: new Float32Array(), normals: new Float32Array(), indices: new Uint32Array() };
+  /** The arrays of the last read. */
+  #room = noArrays();
+  /** The arrays of the read before, which no host uses any more, for the next one from a worker. */
+  #spare = noArrays();
   #mesh: MeshSource | RemoteMeshSource | undefined;
   /** Number of reads, so that a surface that arrives late does not replace a newer one. */
   #reads = 0;
@@ -87,7 +111,7 @@ export class MeshReader {
   }
 
   /** Has `show` show a mesh, here or in a worker, if it has changed since the last read; returns whether it had. */
-  update(mesh: MeshSource | RemoteMeshSource, show: (frame: SurfaceArrays) => void): boolean | Promise<boolean> {
+  update(mesh: AnyMesh, show: (frame: SurfaceArrays) => void): boolean | Promise<boolean> {
     const shown = (frame: SurfaceArrays | undefined) => {
       if (frame) show(frame);
       return frame !== undefined;
@@ -97,7 +121,7 @@ export class MeshReader {
   }
 
   /** Does what {@link read} does; with a surface in a worker, a promise of it. */
-  readOrFetch(mesh: MeshSource | RemoteMeshSource): SurfaceArrays | undefined | Promise<SurfaceArrays | undefined> {
+  readOrFetch(mesh: AnyMesh): SurfaceArrays | undefined | Promise<SurfaceArrays | undefined> {
     return isRemote(mesh) ? this.#fetch(mesh) : this.read(mesh);
   }
 
@@ -105,15 +129,28 @@ export class MeshReader {
    * Returns the surface in the host's space, or undefined if it has not changed since the last read; throws `precision`
    * with the remedy if single precision in world space does not suffice.
    */
-  read(mesh: MeshSource): SurfaceArrays | undefined {
+  read(mesh: MeshSource | MeshSnapshot): SurfaceArrays | undefined {
+    if (isSnapshot(mesh)) return this.#readSnapshot(mesh);
     checkSource(mesh);
     this.#reads += 1;
     this.#warnings = mesh.warnings ?? [];
     const topology = mesh !== this.#mesh || mesh.topologyVersion !== this.#topology;
     if (!topology && mesh.geometryVersion === this.#geometry) return undefined;
     const frame = this.#takeOrAdvise(mesh);
+    this.#spare = noArrays();
     [this.#mesh, this.#topology, this.#geometry] = [mesh, mesh.topologyVersion, mesh.geometryVersion];
     return this.#placed(frame, topology);
+  }
+
+  #readSnapshot(snapshot: MeshSnapshot): SurfaceArrays {
+    this.clear();
+    if (this.#remedy && snapshot.origin.some((coordinate) => coordinate !== 0))
+      throw invalid('mesh', `a snapshot relative to an origin: ${this.#remedy}, or take it in world space`);
+    const frame = this.#placed(snapshot, true);
+    // Its arrays are the caller's again, once there is another surface.
+    this.#room = noArrays();
+    this.#spare = noArrays();
+    return frame;
   }
 
   /** Does what {@link read} does, with a surface in a worker; undefined, too, if another one was read meanwhile. */
@@ -124,19 +161,23 @@ export class MeshReader {
     if (own !== this.#reads) return undefined;
     this.#warnings = warnings ?? [];
     if (mesh === this.#mesh && before === this.#topology && geometry === this.#geometry) return undefined;
-    const arriving = Promise.all([mesh.arrays(this.#options), mesh.topologyVersion]);
+    const arriving = Promise.all([this.#takeFrom(mesh), mesh.topologyVersion]);
     const [frame, after] = await arriving.catch((error) => this.#advise(error));
     if (own !== this.#reads) return undefined;
     const topology = mesh !== this.#mesh || before !== after || after !== this.#topology;
     // Triangles that have changed between the two are read again the next time.
     [this.#mesh, this.#topology, this.#geometry] = [mesh, before === after ? after : Number.NaN, geometry];
+    this.#spare = this.#room;
     return this.#placed(frame, topology);
   }
 
-  #placed(frame: MeshArrays, topology: boolean): SurfaceArrays {
-    const origin: Vec3 = [...(frame.origin ?? ([0, 0, 0] as const))];
-    if (this.#rotated) for (const values of [frame.positions, frame.normals, origin]) rotate180(values);
-    return { ...frame, origin, topology };
+  #placed(frame: MeshSnapshot, topology: boolean): SurfaceArrays {
+    const { vertices, triangles, ...room } = frame;
+    this.#room = room;
+    const used = usedPart(frame);
+    const origin: Vec3 = [...frame.origin];
+    if (this.#rotated) for (const values of [used.positions, used.normals, origin]) rotate180(values);
+    return { ...used, origin, topology, room };
   }
 
   /** Warnings of the mesh last read. */
@@ -144,7 +185,7 @@ export class MeshReader {
     return [...this.#warnings];
   }
 
-  #takeOrAdvise(mesh: MeshSource): MeshArrays {
+  #takeOrAdvise(mesh: MeshSource): MeshSnapshot {
     try {
       return this.#take(mesh);
     } catch (error) {
@@ -162,10 +203,20 @@ export class MeshReader {
     return { relative: this.#remedy === undefined };
   }
 
-  #take(mesh: MeshSource): MeshArrays {
-    if (!mesh.copyTo) return copied(mesh.arrays(this.#options));
-    const { vertices, triangles } = mesh.copyTo(this.#arrays, this.#options);
-    return usedPart(this.#arrays, vertices, triangles);
+  #take(mesh: MeshSource): MeshSnapshot {
+    // Arrays that a host draws may be written to until it draws again.
+    if (mesh.snapshot) return mesh.snapshot(this.#room, this.#options);
+    if (!mesh.copyTo) return withRoom(mesh.arrays(this.#options), this.#room);
+    const arrays = { ...this.#room };
+    const counts = mesh.copyTo(arrays, this.#options);
+    return { ...arrays, ...counts, origin: arrays.origin ?? [0, 0, 0] };
+  }
+
+  async #takeFrom(mesh: RemoteMeshSource): Promise<MeshSnapshot> {
+    if (!mesh.snapshot) return withRoom(await mesh.arrays(this.#options), this.#spare);
+    const spare = this.#spare;
+    this.#spare = noArrays();
+    return mesh.snapshot(spare, this.#options);
   }
 
   /** Forgets the mesh last read, so that the next read returns it in full. */
@@ -179,27 +230,31 @@ export class MeshReader {
 function checkSource(mesh: MeshSource): void {
   const { topologyVersion, geometryVersion, arrays } = Object(mesh) as Partial<MeshSource>;
   if (typeof arrays === 'function' && Number.isFinite(topologyVersion) && Number.isFinite(geometryVersion)) return;
-  throw notA('Mesh', 'mesh', mesh, ', or an object with arrays(), topologyVersion and geometryVersion');
+  throw notA('Mesh', 'mesh', mesh, ', a snapshot, or an object with arrays(), topologyVersion and geometryVersion');
 }
 
-// Arrays owned by others must not be rotated in place.
-function copied({ positions, normals, ...rest }: MeshArrays): MeshArrays {
-  return { ...rest, positions: positions.slice(), normals: normals.slice() };
+/** Copies a surface whose arrays are owned by others into arrays with spare capacity: those of `reuse` that are as long. */
+function withRoom({ positions, normals, indices, uvs, colors, origin }: MeshArrays, reuse: MeshArrays): MeshSnapshot {
+  return {
+    positions: copyWithRoom(reuse.positions, positions, 3, Float32Array),
+    normals: copyWithRoom(reuse.normals, normals, 3, Float32Array),
+    indices: copyWithRoom(reuse.indices, indices, 3, Uint32Array),
+    ...(uvs && { uvs: copyWithRoom(reuse.uvs, uvs, 2, Float32Array) }),
+    ...(colors && { colors: copyWithRoom(reuse.colors, colors, 3, Float32Array) }),
+    vertices: positions.length / 3,
+    triangles: indices.length / 3,
+    origin: origin ?? [0, 0, 0],
+  };
 }
 
 /** Returns views of the used part of the arrays, which may be longer than the mesh needs. */
-function usedPart(
-  { positions, normals, indices, uvs, colors, origin }: MeshArrays,
-  vertices: number,
-  triangles: number,
-): MeshArrays {
+function usedPart({ positions, normals, indices, uvs, colors, vertices, triangles }: MeshSnapshot): MeshArrays {
   return {
     positions: positions.subarray(0, 3 * vertices),
     normals: normals.subarray(0, 3 * vertices),
     indices: indices.subarray(0, 3 * triangles),
     ...(uvs && { uvs: uvs.subarray(0, 2 * vertices) }),
     ...(colors && { colors: colors.subarray(0, 3 * vertices) }),
-    ...(origin && { origin }),
   };
 }
 

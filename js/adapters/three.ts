@@ -7,9 +7,10 @@
  */
 import { choice, invalid } from '../check.js';
 import type { Space, Vec3, VolumeInit } from '../data.js';
-import type { MeshArrays } from '../mesh.js';
+import type { MeshArrays, MeshSnapshot } from '../mesh.js';
 import type { Warning } from '../warning.js';
 import {
+  type AnyMesh,
   affineOf,
   bounds,
   MeshReader,
@@ -19,7 +20,7 @@ import {
   voxels,
 } from './source.js';
 
-export type { MeshSource, RemoteMeshSource } from './source.js';
+export type { AnyMesh, MeshSource, RemoteMeshSource } from './source.js';
 
 /** The properties of a volume of three's `NRRDLoader` that {@link volumeFromThree} reads. */
 export interface ThreeVolume {
@@ -110,6 +111,7 @@ function inSpace(name: string, vectors: number[][], origin: number[]): { affine:
 
 /** The members of a three.js `BufferAttribute` that the adapter uses. */
 interface Attribute {
+  array: object;
   needsUpdate: boolean;
   clearUpdateRanges(): void;
   addUpdateRange(start: number, count: number): void;
@@ -146,6 +148,8 @@ export interface ThreeObject {
   position?: Vector;
 }
 
+type ArrayName = Exclude<keyof MeshArrays, 'origin'>;
+
 /** Arrays of a mesh with values per vertex, each with its attribute name in three.js and its numbers per vertex. */
 const ATTRIBUTES = [
   ['positions', 'position', 3],
@@ -153,9 +157,6 @@ const ATTRIBUTES = [
   ['uvs', 'uv', 2],
   ['colors', 'color', 3],
 ] as const;
-
-/** Capacity of new vertex and index buffers as a multiple of their contents, so that they are seldom reallocated. */
-const CAPACITY_FACTOR = 1.5;
 
 /**
  * A surface in a three.js scene that follows a mesh, through all changes of connectivity.
@@ -215,15 +216,20 @@ export class ThreeSurface {
    *   is too coarse there, and an object without a `position`.
    */
   update(mesh: MeshSource): boolean;
+  /**
+   * The same for a snapshot, whose arrays become the buffers without a copy: they are the caller's again, and can be those
+   * of a new snapshot, after the next update.
+   */
+  update(snapshot: MeshSnapshot): boolean;
   /** The same for a mesh in a worker: resolves when it is there, with false, too, if a later call was there before. */
   update(mesh: RemoteMeshSource): Promise<boolean>;
-  update(mesh: MeshSource | RemoteMeshSource): boolean | Promise<boolean> {
+  update(mesh: AnyMesh): boolean | Promise<boolean> {
     return this.#reader.update(mesh, (frame) => this.#show(frame));
   }
 
   #show(frame: SurfaceArrays): void {
     this.#move(frame.origin);
-    if (!this.#buffers?.fit(frame)) this.#grow(frame);
+    if (!this.#buffers?.fit(frame.room)) this.#replace(frame.room);
     this.#buffers?.write(frame);
   }
 
@@ -234,9 +240,9 @@ export class ThreeSurface {
     this.#moved = moved;
   }
 
-  #grow(frame: SurfaceArrays): void {
+  #replace(room: MeshArrays): void {
     this.#buffers?.geometry.dispose();
-    this.#buffers = new Buffers(this.#three, frame);
+    this.#buffers = new Buffers(this.#three, room);
     this.#object.geometry = this.#buffers.geometry;
   }
 
@@ -248,50 +254,41 @@ export class ThreeSurface {
   }
 }
 
-/**
- * A three.js geometry whose buffers have a larger capacity than their contents, so that a growing mesh fits for a
- * while.
- */
+/** A three.js geometry whose buffers have spare capacity, so that a changing mesh fits for a while. */
 class Buffers {
   readonly geometry: Geometry;
-  readonly #parts = new Map<keyof MeshArrays, { array: Float32Array | Uint32Array; attribute: Attribute }>();
+  readonly #parts = new Map<ArrayName, { length: number; attribute: Attribute }>();
   readonly #sphere: { center: Vector; radius: number };
   readonly #box: { min: Vector; max: Vector };
   #filled = false;
 
-  constructor({ BufferGeometry, BufferAttribute, Sphere, Box3 }: ThreeClasses, frame: MeshArrays) {
+  constructor({ BufferGeometry, BufferAttribute, Sphere, Box3 }: ThreeClasses, room: MeshArrays) {
     this.geometry = new BufferGeometry();
     // Bounds are set by hand: three would include stale values beyond the contents.
     this.geometry.boundingSphere = this.#sphere = new Sphere();
     this.geometry.boundingBox = this.#box = new Box3();
-    for (const [name, called, size] of ATTRIBUTES) {
-      const values = frame[name];
-      if (!values) continue;
-      const array = new Float32Array(size * capacityFor(values.length / size));
+    const part = (name: ArrayName, array: Float32Array | Uint32Array, size: number): Attribute => {
       const attribute = new BufferAttribute(array, size);
-      this.geometry.setAttribute(called, attribute);
-      this.#parts.set(name, { array, attribute });
+      this.#parts.set(name, { length: array.length, attribute });
+      return attribute;
+    };
+    for (const [name, called, size] of ATTRIBUTES) {
+      const array = room[name];
+      if (array) this.geometry.setAttribute(called, part(name, array, size));
     }
-    const array = new Uint32Array(3 * capacityFor(frame.indices.length / 3));
-    const attribute = new BufferAttribute(array, 1);
-    this.geometry.setIndex(attribute);
-    this.#parts.set('indices', { array, attribute });
+    this.geometry.setIndex(part('indices', room.indices, 1));
   }
 
-  /**
-   * Returns whether the buffers have the capacity for a surface, and exactly its set of attributes, so that they can be
-   * reused.
-   */
-  fit(frame: MeshArrays): boolean {
-    return (['indices', ...ATTRIBUTES.map(([name]) => name)] as const).every((name) => {
-      const [room, needed] = [this.#parts.get(name)?.array.length, frame[name]?.length];
-      return room === undefined || needed === undefined ? room === needed : needed <= room;
-    });
+  /** Returns whether arrays are as long as the buffers, with exactly the same attributes, so that they can be reused. */
+  fit(room: MeshArrays): boolean {
+    return (['indices', ...ATTRIBUTES.map(([name]) => name)] as const).every(
+      (name) => this.#parts.get(name)?.length === room[name]?.length,
+    );
   }
 
   write(frame: SurfaceArrays): void {
-    for (const [name] of ATTRIBUTES) this.#fill(name, frame[name]);
-    if (frame.topology || !this.#filled) this.#fill('indices', frame.indices);
+    for (const [name] of ATTRIBUTES) this.#fill(name, frame);
+    this.#fill('indices', frame, frame.topology || !this.#filled);
     this.#filled = true;
     this.geometry.setDrawRange(0, frame.indices.length);
     const { min, max } = bounds(frame.positions);
@@ -301,15 +298,14 @@ class Buffers {
     this.#sphere.radius = Math.hypot(max[0] - min[0], max[1] - min[1], max[2] - min[2]) / 2;
   }
 
-  #fill(name: keyof MeshArrays, values: Float32Array | Uint32Array | undefined): void {
-    const part = this.#parts.get(name);
-    if (!part || !values) return;
-    const { array, attribute } = part;
-    array.set(values);
+  /** Makes the arrays of a surface those of the buffers; of those to upload, what is used. */
+  #fill(name: ArrayName, { [name]: used, room }: SurfaceArrays, uploads = true): void {
+    const [attribute, array] = [this.#parts.get(name)?.attribute, room[name]];
+    if (!attribute || !used || !array) return;
+    attribute.array = array;
+    if (!uploads) return;
     attribute.clearUpdateRanges();
-    attribute.addUpdateRange(0, values.length);
+    attribute.addUpdateRange(0, used.length);
     attribute.needsUpdate = true;
   }
 }
-
-const capacityFor = (count: number): number => Math.ceil(CAPACITY_FACTOR * count);

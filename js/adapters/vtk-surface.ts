@@ -1,8 +1,16 @@
 // Shows a surface in vtk.js that follows a mesh.
 import { invalid } from '../check.js';
 import type { Space } from '../data.js';
+import type { MeshSnapshot } from '../mesh.js';
 import type { Warning } from '../warning.js';
-import { MeshReader, type MeshSource, polygons, type RemoteMeshSource, type SurfaceArrays } from './source.js';
+import {
+  type AnyMesh,
+  MeshReader,
+  type MeshSource,
+  polygons,
+  type RemoteMeshSource,
+  type SurfaceArrays,
+} from './source.js';
 
 interface DataArray {
   setData(values: Float32Array | Uint32Array, components?: number): void;
@@ -85,10 +93,10 @@ export class VtkSurface<P extends VtkPolyData> {
    * @throws `VesicleError` `invalid-argument`: no mesh; `precision`: a mesh so far from the origin that single precision
    *   is too coarse there, without an `actor`.
    */
-  update(mesh: MeshSource): boolean;
+  update(mesh: MeshSource | MeshSnapshot): boolean;
   /** The same for a mesh in a worker: resolves when it is there, with false, too, if a later call was there before. */
   update(mesh: RemoteMeshSource): Promise<boolean>;
-  update(mesh: MeshSource | RemoteMeshSource): boolean | Promise<boolean> {
+  update(mesh: AnyMesh): boolean | Promise<boolean> {
     return this.#reader.update(mesh, (frame) => this.#show(frame));
   }
 

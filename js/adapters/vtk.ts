@@ -7,7 +7,7 @@
  * @module vesicle/vtk
  */
 export type { LabelClasses } from './label-map.js';
-export type { MeshSource, RemoteMeshSource } from './source.js';
+export type { AnyMesh, MeshSource, RemoteMeshSource } from './source.js';
 export { type ItkImage, type VtkImage, volumeFromItk, volumeFromVtk } from './vtk-image.js';
 export { type VtkImageClasses, VtkLabelSurfaces, type VtkLabelSurfacesOptions, vtkFromVolume } from './vtk-labels.js';
 export { type VtkActor, type VtkClasses, type VtkPolyData, VtkSurface } from './vtk-surface.js';

@@ -1,6 +1,6 @@
 // The custom element: takes attributes, and shows a surface and figures about it.
 import { invalid } from '../check.js';
-import type { MeshArrays } from '../mesh.js';
+import type { MeshSnapshot } from '../mesh.js';
 import type { StepReport } from '../stepper.js';
 import type { Warning } from '../warning.js';
 import { mergedWarnings } from '../warnings.js';
@@ -191,9 +191,9 @@ export class VesicleLab extends HTMLElement {
 
   async #show(): Promise<void> {
     const model = this.#model;
-    const arrays = (await model?.mesh.arrays()) as MeshArrays | undefined;
-    if (model !== this.#model || !arrays?.indices.length) return;
-    this.#view?.show(arrays);
+    const surface = (await model?.mesh.snapshot()) as MeshSnapshot | undefined;
+    if (model !== this.#model || !surface?.triangles) return;
+    this.#view?.show(surface);
     // The final surface may be much smaller than the initial one.
     if (!this.#fitted || this.state === 'done') this.#view?.frame(this.#viewDirection);
     this.#fitted = true;

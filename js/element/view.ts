@@ -1,9 +1,9 @@
 // The 3D view of the element.
 import * as THREE from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
-import { type MeshSource, ThreeSurface } from '../adapters/three.js';
+import { ThreeSurface } from '../adapters/three.js';
 import type { Vec3 } from '../data.js';
-import type { MeshArrays } from '../mesh.js';
+import type { MeshSnapshot } from '../mesh.js';
 
 const FIELD_OF_VIEW = 40;
 /** Upper bound of the device pixel ratio at which a `<vesicle-lab>` renders its surface. */
@@ -23,7 +23,6 @@ export class View {
   readonly #observer = new ResizeObserver(() => this.#resize());
   /** Whether the user has not moved the camera yet, so that it may still be adjusted automatically. */
   #untouched = true;
-  #version = 0;
   #asked = 0;
 
   /** Creates the view of a surface on a canvas; throws if WebGL is not available. */
@@ -43,11 +42,9 @@ export class View {
     this.#observer.observe(canvas);
   }
 
-  /** Shows a surface, given by its arrays, and requests a rendering. */
-  show(arrays: MeshArrays): void {
-    this.#version += 1;
-    const source: MeshSource = { topologyVersion: this.#version, geometryVersion: this.#version, arrays: () => arrays };
-    this.#surface.update(source);
+  /** Shows a surface, and requests a rendering. */
+  show(surface: MeshSnapshot): void {
+    this.#surface.update(surface);
     this.#ask();
   }
 

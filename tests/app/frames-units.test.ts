@@ -1,7 +1,6 @@
 /** Buffers and simplified surfaces for rendering, without a browser. */
 import { beforeAll, describe, expect, test } from 'vitest';
 import init, { Mesh } from '../../pkg/index.js';
-import { capacityFor, copySurface, emptyArrays } from '../../www/src/engine/surface-buffers';
 import { type FineMesh, simplifiedIndices } from '../../www/src/scene/simplify';
 
 beforeAll(() => init());
@@ -9,33 +8,9 @@ beforeAll(() => init());
 const ball = (edge: number) => Mesh.icosphere({ center: [5, 6, 7], radius: 2, maxEdge: edge });
 
 function fineOf(mesh: Mesh): FineMesh {
-  const { positions, normals, indices, vertices, triangles } = copySurface(emptyArrays(), mesh);
+  const { positions, normals, indices, vertices, triangles } = mesh.snapshot();
   return { positions, normals, indices, vertices, corners: 3 * triangles };
 }
-
-describe('buffer capacity', () => {
-  test('is sufficient, not much larger, and seldom changes', () => {
-    const rooms = Array.from({ length: 20_000 }, (_, count) => capacityFor(count));
-    expect(rooms.filter((room, count) => room < count)).toEqual([]);
-    expect(rooms.filter((room, count) => room > Math.max(1, 1.25 * count) + 1)).toEqual([]);
-    expect(new Set(rooms).size).toBeLessThan(50);
-  });
-
-  test('a mesh is copied into given arrays if they are large enough, and into new ones otherwise', () => {
-    const mesh = ball(0.5);
-    const first = copySurface(emptyArrays(), mesh);
-    expect(first.vertices).toBe(mesh.vertexCount);
-    expect(first.positions.subarray(0, 3 * first.vertices)).toEqual(mesh.arrays().positions);
-    const second = copySurface(first, mesh);
-    expect(second.positions).toBe(first.positions);
-    expect(second.indices).toBe(first.indices);
-    mesh.refine();
-    const third = copySurface(second, mesh);
-    expect(third.positions).not.toBe(second.positions);
-    expect(third.indices.subarray(0, 3 * third.triangles)).toEqual(mesh.arrays().indices);
-    mesh.free();
-  });
-});
 
 describe('a coarse surface', () => {
   test('has about the requested number of triangles, on vertices of the fine one', () => {

@@ -141,7 +141,35 @@ test('three: a mesh that outgrows its buffers gets new ones, and the old ones ar
   expect(object.geometry).not.toBe(first);
   expect(disposed).toBe(1);
   expect(inUse(object)).toEqual([...source.arrays().indices]);
-  expect(values(object, 'position').array.length).toBeGreaterThan(1.4 * source.arrays().positions.length);
+  expect(values(object, 'position').array.length).toBeLessThanOrEqual(1.25 * source.arrays().positions.length + 3);
+});
+
+test('three: a snapshot is shown without a copy, in the same buffers while it fits', () => {
+  const { object, surface } = scene();
+  const mesh = Mesh.icosphere({ center: [1, 2, 3], radius: 2, maxEdge: 0.5 });
+  const [first, second] = [mesh.snapshot(), mesh.snapshot()];
+  expect(surface.update(first)).toBe(true);
+  expect(values(object, 'position').array).toBe(first.positions);
+  const { geometry } = object;
+  expect(surface.update(second)).toBe(true);
+  expect(object.geometry).toBe(geometry);
+  expect([values(object, 'position').array, index(object).array]).toEqual([second.positions, second.indices]);
+  expect(values(object, 'normal').array).toBe(second.normals);
+  expect(inUse(object)).toEqual([...mesh.arrays().indices]);
+  // The arrays of a snapshot are never written to.
+  const kept = second.positions.slice();
+  surface.update(Mesh.icosphere({ center: [0, 0, 0], radius: 2, maxEdge: 0.5 }));
+  expect(second.positions).toEqual(kept);
+  expect(values(object, 'position').array).not.toBe(second.positions);
+});
+
+test('three: a snapshot moves the object to its origin; a host that cannot is told how', () => {
+  const far = Mesh.icosphere({ center: [1e6, 0, 0], radius: 2, maxEdge: 0.5 }).snapshot({}, { relative: true });
+  const { object, surface } = scene();
+  surface.update(far);
+  expect(object.position.toArray()).toEqual(far.origin);
+  const fixed = new ThreeSurface(THREE, { geometry: new THREE.BufferGeometry() });
+  expect(failure(() => fixed.update(far)).message).toMatch(/position/);
 });
 
 test('three: colours can be added and removed', () => {

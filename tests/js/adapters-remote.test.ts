@@ -51,6 +51,27 @@ test('three: a model in a worker is shown after each step, and nothing is sent i
   model.free();
 });
 
+test('three: the buffers of every second surface are used again, in the worker and on the page', async () => {
+  const mesh = await Mesh.icosphere({ center: [0, 0, 0], radius: 2, maxEdge: 0.5 });
+  const object = new THREE.Mesh();
+  const surface = new ThreeSurface(THREE, object);
+  await surface.update(mesh);
+  const { geometry } = object;
+  const position = geometry.getAttribute('position') as THREE.BufferAttribute;
+  const arrays = [position.array];
+  for (let move = 0; move < 4; move++) {
+    await mesh.transform([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.5, 0, 0, 1]);
+    expect(await surface.update(mesh)).toBe(true);
+    expect(position.array.length).toBeGreaterThan(0);
+    expect([...position.array.subarray(0, 3)]).toEqual([...(await mesh.arrays()).positions.subarray(0, 3)]);
+    arrays.push(position.array);
+  }
+  expect(object.geometry).toBe(geometry);
+  // Transferred arrays are empty here.
+  expect(arrays.map(({ length }) => length > 0)).toEqual([false, false, false, true, true]);
+  mesh.free();
+});
+
 test('three: of several updates, the last one wins; one of a freed mesh rejects', async () => {
   const [first, last] = await Promise.all(
     [4, 0.5].map((maxEdge) => Mesh.icosphere({ center: [0, 0, 0], radius: 2, maxEdge })),

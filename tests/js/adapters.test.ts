@@ -68,7 +68,7 @@ function agree(init: VolumeInit, { size, world, value }: Host): Volume {
 
 test('adapters import neither hosts nor the module', async () => {
   const folder = new URL('../../pkg/adapters/', import.meta.url);
-  const own = ['check', 'error', 'kind', 'pause', 'stepper', 'warnings'];
+  const own = ['check', 'error', 'kind', 'pause', 'room', 'stepper', 'warnings'];
   const files = (await readdir(folder)).filter((name) => name.endsWith('.js'));
   expect(files).toContain('source.js');
   for (const file of files) {

@@ -1,4 +1,4 @@
-import { expect, test } from 'vitest';
+import { describe, expect, test } from 'vitest';
 import { Mesh, type MeshArrays, type MeshFormat } from '../../pkg/index.js';
 import { ball, failure, HEALTHY, wrong } from './helpers.js';
 
@@ -67,6 +67,58 @@ test('copyTo keeps buffers that are long enough', () => {
   expect(room.indices).not.toBe(indices);
   expect(room.positions.subarray(0, out.positions.length)).toEqual(out.positions);
   expect(room.indices).toEqual(out.indices);
+});
+
+describe('snapshots', () => {
+  test('have room, which is not much, and seldom changes while a mesh grows', () => {
+    const lengths = new Set<number>();
+    for (let triangles = 1; triangles <= 400; triangles++) {
+      const indices = Uint32Array.from({ length: 3 * triangles }, (_, corner) => corner % 3);
+      const snapshot = Mesh.fromArrays(CORNERS, indices).snapshot();
+      expect(snapshot).toMatchObject({ triangles, vertices: 4, origin: [0, 0, 0] });
+      expect(snapshot.indices.length).toBeLessThanOrEqual(1.25 * 3 * triangles + 3);
+      expect(snapshot.indices.subarray(0, 3 * triangles)).toEqual(indices);
+      lengths.add(snapshot.indices.length);
+    }
+    expect(lengths.size).toBeLessThan(30);
+  });
+
+  test('use arrays again that are long enough, and not much too long', () => {
+    const mesh = sphere();
+    const first = mesh.snapshot();
+    expect(first.positions.subarray(0, 3 * first.vertices)).toEqual(mesh.arrays().positions);
+    const second = mesh.snapshot(first);
+    expect([second.positions, second.normals, second.indices]).toEqual([first.positions, first.normals, first.indices]);
+    expect(second.positions).toBe(first.positions);
+    const finer = mesh.clone();
+    finer.refine();
+    const third = finer.snapshot(second);
+    expect(third.positions).not.toBe(second.positions);
+    expect(third.indices.subarray(0, 3 * third.triangles)).toEqual(finer.arrays().indices);
+    finer.refine();
+    finer.refine();
+    expect(mesh.snapshot(finer.snapshot()).positions.length).toBe(first.positions.length);
+  });
+
+  test('have colours and texture coordinates, with room', () => {
+    const uvs = Float32Array.from([0, 0, 1, 0, 0, 1, 1, 1]);
+    const colors = CORNERS.map((x) => x / 2);
+    const snapshot = Mesh.fromArrays(CORNERS, FACES, { uvs, colors }).snapshot();
+    expect(snapshot.uvs?.subarray(0, 8)).toEqual(uvs);
+    expect(snapshot.colors?.subarray(0, 12)).toEqual(colors);
+    expect(snapshot.colors?.length).toBe(snapshot.positions.length);
+  });
+
+  test('are relative to an origin if that is asked for', () => {
+    const mesh = Mesh.icosphere({ center: [1e6, 0, 0], radius: 1, maxEdge: 0.5 });
+    const { positions, origin } = mesh.snapshot({}, { relative: true });
+    expect(origin).toEqual(mesh.origin);
+    expect(positions.subarray(0, 3 * mesh.vertexCount)).toEqual(mesh.arrays({ relative: true }).positions);
+  });
+
+  test('of wrong properties are refused', () => {
+    expect(failure(() => sphere().snapshot({ values: 1 } as never)).message).toContain('values');
+  });
 });
 
 test('from arrays, with texture coordinates', () => {

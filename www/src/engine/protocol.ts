@@ -6,6 +6,7 @@ import type {
   MeshFormat,
   MeshInfo,
   MeshReport,
+  MeshSnapshot,
   ParamSpec,
   PointArray,
   Space,
@@ -23,6 +24,7 @@ export type {
   MeshFormat,
   MeshInfo,
   MeshReport,
+  MeshSnapshot,
   ParamSpec,
   PointArray,
   Space,
@@ -107,31 +109,10 @@ export interface Plane {
   normal: Vec3;
 }
 
-/**
- * Arrays of a surface that the worker transfers to the page and, in the Extract lab, the page transfers back for reuse,
- * so that none is allocated for each surface sent. They may be longer than the part in use.
- */
-export interface SurfaceBuffers {
-  /** Relative to the origin of the surface. */
-  positions: Float32Array;
-  normals: Float32Array;
-  indices: Uint32Array;
-}
-
 /** A triangle mesh that a lab's worker sends to the page for drawing. */
-export interface Surface extends SurfaceBuffers {
-  /** The origin in world space that the positions are relative to. */
-  origin: Vec3;
-  /** Number of vertices in use; the buffers may be longer. */
-  vertices: number;
-  /** Number of triangles in use; `indices` may be longer. */
-  triangles: number;
+export interface Surface extends MeshSnapshot {
   /** One value per vertex to colour the surface by, if a quantity was requested. */
   values?: Float32Array;
-  /** Colours of the vertices, rgb in 0..1, if the mesh has them. */
-  colors?: Float32Array;
-  /** Texture coordinates of the vertices, packed uv, if a textured surface was requested. */
-  uvs?: Float32Array;
 }
 
 /**

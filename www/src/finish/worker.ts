@@ -6,7 +6,7 @@ import { withoutCompression } from '../engine/gltf';
 import { relativeTo } from '../engine/placing';
 import type { Edit, NamedBytes, SurfacePoint } from '../engine/protocol';
 import { type Handlers, serveWhenReady } from '../engine/serving';
-import { copySurface, emptyArrays, sectionOf } from '../engine/surface-buffers';
+import { sectionOf, snapshotOf } from '../engine/surface';
 import { readFiles } from '../engine/volumes';
 import { text } from '../texts';
 import { distancesBetween, gridAround } from './distances';
@@ -36,7 +36,7 @@ function edited(): Edited {
     part.free();
     return { vertices, volume, area };
   });
-  const surface = copySurface(emptyArrays(), mesh);
+  const surface = snapshotOf(mesh);
   const measures = { info: mesh.info(), report: mesh.check() };
   const undone = states.at(-1)?.log.slice(log.length) ?? [];
   const rest = { undoable: present > 0, undone };

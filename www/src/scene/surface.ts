@@ -1,5 +1,6 @@
 import {
   BackSide,
+  Box3,
   BufferAttribute,
   BufferGeometry,
   type ColorRepresentation,
@@ -17,6 +18,7 @@ import {
   type Texture,
   Vector3,
 } from 'three';
+import { ThreeSurface } from 'vesicle/three';
 import type { Surface } from '../engine/protocol';
 import type { ColorMode } from '../kit/view';
 import { componentColors } from './components';
@@ -43,9 +45,12 @@ const SMOOTH = 10_000;
 /** Colouring of a surface: 'own' are the vertex colours it came with, 'texture' an image. */
 export type SurfaceColor = ColorMode | ShownQuantity | 'own' | 'texture';
 
+/** The classes of three.js that a surface is made of. */
+const CLASSES = { BufferGeometry, BufferAttribute, Sphere, Box3 };
+
 /**
  * A surface in the 3D view whose vertices and triangles change every frame. Its arrays are uploaded to the GPU without
- * a copy in between; arrays of the same capacity as the previous ones reuse the buffers.
+ * a copy in between.
  */
 export class SurfaceObject {
   /** In the coordinates of the world. */
@@ -64,11 +69,8 @@ export class SurfaceObject {
   readonly #plainMaterial = new MeshBasicMaterial({ vertexColors: true });
   #lit = true;
   readonly #edgeMaterial = new LineBasicMaterial({ transparent: true, opacity: 0.4 });
-  /**
-   * Geometry of the surface in full. It has normals from the start: a shader compiled for a surface without them would
-   * always draw flat triangles.
-   */
-  #fine = emptyGeometry();
+  /** Geometry of the surface in full. */
+  #fine = new BufferGeometry();
   /** Simplified geometry, drawn in place of the full one while it exists. */
   #coarse: BufferGeometry | undefined;
   readonly #mesh: Mesh<BufferGeometry, Material> = new Mesh(this.#fine, this.#material);
@@ -77,6 +79,7 @@ export class SurfaceObject {
    * filled.
    */
   readonly #inside = new Mesh(this.#fine, new MeshBasicMaterial({ side: BackSide }));
+  readonly #drawn: ThreeSurface;
   /** Planes that cut the surface; the array is shared, and changes. */
   readonly #clipping: Plane[];
   readonly #edges = new LineSegments(new BufferGeometry(), this.#edgeMaterial);
@@ -102,6 +105,9 @@ export class SurfaceObject {
   /** `clipping` are the planes that cut the surface, as in `Viewport.clipping`. */
   constructor(clipping: Plane[] = []) {
     this.#clipping = clipping;
+    this.#drawn = new ThreeSurface(CLASSES, this.#target());
+    // A shader compiled for a surface without normals would always draw flat triangles.
+    this.#drawn.update(noSurface());
     this.#inside.layers.set(CUT_LAYER);
     this.#edges.visible = false;
     for (const part of [this.#mesh, this.#inside, this.#edges]) {
@@ -136,18 +142,30 @@ export class SurfaceObject {
     return this.#edited;
   }
 
-  #display(surface: Surface): void {
+  #display({ values, colors, ...surface }: Surface): void {
     this.#dropCoarse();
-    this.#placed.position.set(...surface.origin);
     this.#vertices = surface.vertices;
     this.#corners = 3 * surface.triangles;
-    this.#takeOver(surface);
-    this.#fine.setDrawRange(0, this.#corners);
+    this.#drawn.update(surface);
     if (this.#edges.visible) this.#fillEdges();
     this.#hasUvs = surface.uvs !== undefined;
-    this.#values = surface.values ?? new Float32Array(0);
-    this.#colors = surface.colors ?? new Float32Array(0);
+    this.#values = values ?? new Float32Array(0);
+    this.#colors = colors?.subarray(0, 3 * this.#vertices) ?? new Float32Array(0);
     this.#fillColors();
+  }
+
+  /** Returns what receives the geometry and the origin of the surface. */
+  #target(): ConstructorParameters<typeof ThreeSurface>[1] {
+    const [fine, replace] = [() => this.#fine, (geometry: BufferGeometry) => this.#replaceBy(geometry)];
+    return {
+      position: this.#placed.position,
+      get geometry() {
+        return fine();
+      },
+      set geometry(geometry) {
+        replace(geometry as BufferGeometry);
+      },
+    };
   }
 
   /**
@@ -156,6 +174,9 @@ export class SurfaceObject {
    */
   move(positions: Float32Array): void {
     if (this.#edited) return;
+    // Its bounds are not those of the surface any more.
+    this.#fine.boundingSphere?.set(new Vector3(), Number.POSITIVE_INFINITY);
+    this.#fine.boundingBox = null;
     refill(this.#fine.getAttribute('position') as BufferAttribute, positions, 3 * this.#vertices);
   }
 
@@ -244,33 +265,12 @@ export class SurfaceObject {
 
   dispose(): void {
     this.#dropCoarse();
-    this.#fine.dispose();
+    this.#drawn.dispose();
     this.#edges.geometry.dispose();
     this.#material.dispose();
     this.#plainMaterial.dispose();
     this.#inside.material.dispose();
     this.#edgeMaterial.dispose();
-  }
-
-  /**
-   * Takes over the surface's arrays for the GPU. GPU buffers cannot grow: if the arrays' capacities differ from those
-   * before, new buffers are created.
-   */
-  #takeOver({ positions, normals, indices, uvs }: Surface): void {
-    const geometry = this.#fine;
-    const parts: Part[] = [
-      { name: 'position', array: positions, size: 3 },
-      { name: 'normal', array: normals, size: 3 },
-      ...(uvs ? [{ name: 'uv', array: uvs, size: 2 }] : []),
-    ];
-    const fits = parts.every(({ name, array }) => geometry.getAttribute(name)?.array.length === array.length);
-    if (!fits || geometry.index?.array.length !== indices.length) {
-      this.#replaceBy(geometryOf(parts, indices));
-      return;
-    }
-    for (const { name, array, size } of parts)
-      refill(geometry.getAttribute(name) as BufferAttribute, array, size * this.#vertices);
-    refill(geometry.index, indices, this.#corners);
   }
 
   #makeCoarse(): void {
@@ -300,7 +300,6 @@ export class SurfaceObject {
   }
 
   #replaceBy(geometry: BufferGeometry): void {
-    this.#fine.dispose();
     this.#edges.geometry.dispose();
     this.#fine = geometry;
     this.#mesh.geometry = geometry;
@@ -346,27 +345,10 @@ export class SurfaceObject {
   }
 }
 
-/** A vertex attribute of a geometry: its name in three.js, its array, and the numbers per vertex. */
-interface Part {
-  name: string;
-  array: Float32Array;
-  size: number;
-}
-
-function emptyGeometry(): BufferGeometry {
-  const parts = ['position', 'normal'].map((name) => ({ name, array: new Float32Array(3), size: 3 }));
-  return geometryOf(parts, new Uint32Array(3));
-}
-
-/** Creates a geometry that uses these arrays without copying. */
-function geometryOf(parts: Part[], indices: Uint32Array): BufferGeometry {
-  const geometry = new BufferGeometry();
-  for (const { name, array, size } of parts) geometry.setAttribute(name, new BufferAttribute(array, size));
-  geometry.setIndex(new BufferAttribute(indices, 1));
-  geometry.boundingSphere = new Sphere(new Vector3(), Number.POSITIVE_INFINITY);
-  geometry.setDrawRange(0, 0);
-  return geometry;
-}
+const noSurface = (): Surface => ({
+  ...{ positions: new Float32Array(3), normals: new Float32Array(3), indices: new Uint32Array(3) },
+  ...{ vertices: 0, triangles: 0, origin: [0, 0, 0] },
+});
 
 /** Returns the vertex colours of a geometry, created on first use, since most surfaces are plain. */
 function colorsOf(geometry: BufferGeometry): BufferAttribute {

@@ -21,7 +21,6 @@ import type {
   StateEvent,
   StepReport,
   Surface,
-  SurfaceBuffers,
   Vec3,
   VertexQuantity,
   VolumeSource,
@@ -166,12 +165,10 @@ export interface Requests extends CodeRequests {
   seed: { body: undefined; reply: number };
 }
 
-/**
- * Message that returns to the worker, for reuse, the arrays of a surface that the page no longer draws; has no reply.
- */
+/** Message that returns to the worker a surface that the page no longer draws, to use its arrays again; has no reply. */
 export interface ReturnMessage {
   kind: 'return';
-  buffers: SurfaceBuffers;
+  drawn: Surface;
 }
 
 export interface SnapshotEvent {

@@ -1,4 +1,4 @@
-import type { StepReport, SurfaceBuffers, VolumeView } from '../../engine/protocol';
+import type { StepReport, Surface, VolumeView } from '../../engine/protocol';
 import { count } from '../../kit/format';
 import { type History, type HistoryMark, underWay } from '../../kit/history';
 import type { LabState } from '../../kit/state';
@@ -22,8 +22,8 @@ export class ExtractResults {
   #level = 0;
   /** Newest snapshot of the model, until it is displayed. */
   #snapshot: SnapshotEvent | undefined;
-  /** Buffers of the displayed surface, which are returned to the worker when another is displayed. */
-  #shown: SurfaceBuffers | undefined;
+  /** The displayed surface, which is returned to the worker when another is displayed. */
+  #shown: Surface | undefined;
   #framePending = 0;
   /** Counts requests for the pyramid, so that only the reply to the newest is displayed. */
   #pyramids = 0;
@@ -136,12 +136,12 @@ export class ExtractResults {
   }
 
   /**
-   * Returns to the worker, for reuse, the arrays of a surface that is no longer drawn, which also tells it that the page
-   * is ready for the next surface.
+   * Returns to the worker a surface that is no longer drawn, which also tells it that the page is ready for the next
+   * surface.
    */
-  #return({ positions, normals, indices }: SurfaceBuffers): void {
-    const buffers = { positions, normals, indices };
-    this.#client.post({ kind: 'return', buffers }, [positions.buffer, normals.buffer, indices.buffer]);
+  #return({ values: _, ...drawn }: Surface): void {
+    const { positions, normals, indices } = drawn;
+    this.#client.post({ kind: 'return', drawn }, [positions.buffer, normals.buffer, indices.buffer]);
   }
 
   #takeReports(reports: StepReport[]): void {

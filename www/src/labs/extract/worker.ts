@@ -15,13 +15,13 @@ import type {
   ParamValues,
   Plane,
   RunCode,
-  SurfaceBuffers,
+  Surface,
   VertexQuantity,
   VolumeView,
 } from '../../engine/protocol';
 import { logged, RunRecorder } from '../../engine/run-log';
 import { buffersOf, type Handlers, serveLab, Work } from '../../engine/serving';
-import { copySurface, emptyArrays, sectionOf, transferOf } from '../../engine/surface-buffers';
+import { sectionOf, snapshotOf, transferOf } from '../../engine/surface';
 import { checkPlanes, displayOf, levelsOf, openFrame, viewOf } from '../../engine/volumes';
 import { text } from '../../texts';
 import { programOf, type RunData } from './code';
@@ -42,10 +42,10 @@ import type {
 } from './protocol';
 
 /**
- * Number of sets of surface buffers that go back and forth between worker and page: one on the screen, one in transit
+ * Number of surfaces whose arrays go back and forth between worker and page: one on the screen, one in transit
  * or being filled. With more, surfaces would be made that are never drawn.
  */
-const BUFFER_SETS = 2;
+const MOST_SURFACES = 2;
 /**
  * Least milliseconds between two measurements of the surface during a run (area, volume and others); on small meshes
  * one costs as much as a step.
@@ -86,7 +86,8 @@ class Session {
   #inverted = false;
   #planes: Plane[] = [];
   #quantity: VertexQuantity | undefined;
-  #free: SurfaceBuffers[] = Array.from({ length: BUFFER_SETS }, emptyArrays);
+  /** Surfaces that the page no longer draws; at first, as many as it may have. */
+  #free: (Surface | undefined)[] = Array.from({ length: MOST_SURFACES }, () => undefined);
   #reports: StepReport[] = [];
   #done = false;
   #iteration = 0;
@@ -130,8 +131,8 @@ class Session {
     data: () => ({ extension: 'nii', bytes: this.#image().toNifti() }),
   };
 
-  takeBack(buffers: SurfaceBuffers): void {
-    if (this.#free.length < BUFFER_SETS) this.#free.push(buffers);
+  takeBack(drawn: Surface): void {
+    if (this.#free.length < MOST_SURFACES) this.#free.push(drawn);
   }
 
   async #load(body: Requests['load']['body'], signal: AbortSignal): Promise<Loaded> {
@@ -448,7 +449,7 @@ class Session {
   #snapshot(detail: Detail): void {
     const model = this.#current();
     const { mesh, level } = model;
-    const surface = copySurface(this.#free.pop() ?? emptyArrays(), mesh);
+    const surface = snapshotOf(mesh, this.#free.pop());
     const sections = this.#planes.map((plane) => sectionOf(mesh, plane));
     const measures = detail === 'plain' ? undefined : this.#measure(mesh, detail === 'checked');
     const reports = this.#reports;
@@ -468,4 +469,4 @@ class Session {
 }
 
 const session = new Session();
-serveLab('deformable', session.handlers, ({ buffers }: ReturnMessage) => session.takeBack(buffers));
+serveLab('deformable', session.handlers, ({ drawn }: ReturnMessage) => session.takeBack(drawn));

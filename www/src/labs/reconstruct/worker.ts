@@ -6,7 +6,7 @@ import { workerFailure } from '../../engine/failure';
 import type { Surface } from '../../engine/protocol';
 import { logged, RunRecorder } from '../../engine/run-log';
 import { buffersOf, type Handlers, serveLab, Work } from '../../engine/serving';
-import { copySurface, emptyArrays, transferOf } from '../../engine/surface-buffers';
+import { snapshotOf, transferOf } from '../../engine/surface';
 import { fileOf } from '../../engine/volumes';
 import { text } from '../../texts';
 import { pointsFile, programOf } from './code';
@@ -247,7 +247,7 @@ class Session {
     if (!this.#shown) return;
     const mesh = this.#current().preview();
     try {
-      if (mesh.vertexCount > 0) this.#sendSurface(copySurface(emptyArrays(), mesh), true);
+      if (mesh.vertexCount > 0) this.#sendSurface(snapshotOf(mesh), true);
     } finally {
       mesh.free();
       this.#previewedAt = performance.now();
@@ -263,7 +263,7 @@ class Session {
     if (version === this.#sent) return;
     this.#sent = version;
     const values = this.#quantity && valuesFor(model, this.#pointsInForce(), this.#quantity);
-    this.#sendSurface({ ...copySurface(emptyArrays(), mesh), ...(values && { values }) }, false);
+    this.#sendSurface({ ...snapshotOf(mesh), ...(values && { values }) }, false);
   }
 
   #sendSurface(surface: Surface, preview: boolean): void {

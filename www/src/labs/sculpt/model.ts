@@ -2,7 +2,7 @@
 
 import { type Mesh, MultiresolutionModel, type MultiresParams } from 'vesicle';
 import type { Surface } from '../../engine/protocol';
-import { copySurface, emptyArrays, texturedSurface } from '../../engine/surface-buffers';
+import { snapshotOf } from '../../engine/surface';
 import { scaled } from './ellipsoids';
 import { fitted } from './fit';
 import type { Facts, MeshSource, Pose, SavedPose, SceneSource, SculptQuantity, Setup } from './protocol';
@@ -108,7 +108,7 @@ export function buildModel({ detail, base }: Scene, start: Pose, { params, suppo
 
 /** Returns a copy of a mesh for the page to draw, with the `values` to colour it by if there is one for each vertex. */
 export function surfaceOf(mesh: Mesh, values?: Float32Array): Surface {
-  const { uvs: _, ...surface } = copySurface(emptyArrays(), mesh);
+  const { uvs: _, ...surface } = snapshotOf(mesh);
   // Values computed for another mesh do not belong to these vertices.
   return values && values.length === surface.vertices ? { ...surface, values: values.slice() } : surface;
 }
@@ -117,7 +117,7 @@ export function surfaceOf(mesh: Mesh, values?: Float32Array): Surface {
 export function texturedSurfaceOf(mesh: Mesh): Surface {
   const split = mesh.splitAtSeams();
   try {
-    return texturedSurface(split);
+    return snapshotOf(split);
   } finally {
     split.free();
   }

@@ -5,7 +5,7 @@ import { toCode } from '../../engine/code';
 import { workerFailure } from '../../engine/failure';
 import { logged, RunRecorder } from '../../engine/run-log';
 import { type Handlers, serveLab, Work } from '../../engine/serving';
-import { transferOf } from '../../engine/surface-buffers';
+import { transferOf } from '../../engine/surface';
 import { text } from '../../texts';
 import { meshFile, type Origins, originsOf, programOf } from './code';
 import {

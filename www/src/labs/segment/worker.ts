@@ -6,7 +6,7 @@ import { quantize } from '../../engine/quantize';
 import { type Handlers, serveLab } from '../../engine/serving';
 import { withLabels } from '../../engine/slicer';
 import { areSmall, SEGMENT_OF_SMALL, tooManyLabels } from '../../engine/small-files';
-import { capacityFor } from '../../engine/surface-buffers';
+import { snapshotOf } from '../../engine/surface';
 import { triangleArea } from '../../engine/triangle-area';
 import { displayOf, fitsNifti, viewOf } from '../../engine/volumes';
 import type { Warning } from '../../engine/warnings';
@@ -97,7 +97,7 @@ class LiveMap {
 
   describe(value: number): LabelSurface {
     const voxels = this.#counts.get(value) ?? 0;
-    const surface = voxels > 0 ? this.#surface(value) : undefined;
+    const surface = voxels > 0 ? snapshotOf(this.surfaces.mesh(value)) : undefined;
     this.#sent.set(value, this.surfaces.mesh(value).geometryVersion);
     return { value, voxels, volume: voxels * this.#voxelVolume, area: surface ? areaOf(surface) : 0, surface };
   }
@@ -105,20 +105,6 @@ class LiveMap {
   free(): void {
     this.surfaces.free();
     this.map.free();
-  }
-
-  /** Copies a surface into arrays with spare capacity. */
-  #surface(value: number): Surface {
-    const mesh = this.surfaces.mesh(value);
-    const { vertexCount: vertices, triangleCount: triangles } = mesh;
-    const [numbers, corners] = [3 * capacityFor(vertices), 3 * capacityFor(triangles)];
-    const arrays = {
-      positions: new Float32Array(numbers),
-      normals: new Float32Array(numbers),
-      indices: new Uint32Array(corners),
-    };
-    mesh.copyTo(arrays, { relative: true });
-    return { ...arrays, vertices, triangles, origin: mesh.origin };
   }
 
   /** Counts the present labels of a box, each as `change`. */

@@ -1,6 +1,6 @@
 /** Collects the data that the page displays for a tracked frame. */
 import type { SurfaceTracker } from 'vesicle';
-import { copySurface, emptyArrays } from '../../engine/surface-buffers';
+import { snapshotOf } from '../../engine/surface';
 import { type CineSpec, wallDistances } from './cine';
 import type { SurfaceError, TrackedFrame } from './protocol';
 
@@ -8,7 +8,7 @@ import type { SurfaceError, TrackedFrame } from './protocol';
 export function trackedFrame(tracker: SurfaceTracker, index: number, spec: CineSpec | undefined): TrackedFrame {
   const mesh = tracker.meshAt(index);
   try {
-    const surface = copySurface(emptyArrays(), mesh);
+    const surface = snapshotOf(mesh);
     const facts = tracker.statistics[index];
     if (!facts) throw new Error(`frame ${index} has no facts`);
     const error = spec && errorOf(spec, index, surface.positions.subarray(0, 3 * surface.vertices));

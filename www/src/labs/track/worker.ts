@@ -6,7 +6,7 @@ import { workerFailure } from '../../engine/failure';
 import { inWorld } from '../../engine/placing';
 import { logged, type RunLog, RunRecorder } from '../../engine/run-log';
 import { type Handlers, serveLab, Work } from '../../engine/serving';
-import { transferOf } from '../../engine/surface-buffers';
+import { transferOf } from '../../engine/surface';
 import { displayOf, intensitiesOf, viewOf } from '../../engine/volumes';
 import type { Warning } from '../../engine/warnings';
 import { text } from '../../texts';
