@@ -13,7 +13,7 @@ import { phraseRule } from './prose/rule.mjs';
 import { must, root, script, startedAs } from './shell.mjs';
 
 /** Files that have prose. */
-const ENDINGS = /\.(md|rs|[mc]?[jt]s|py|css|toml)$|^www\/src\/texts\/.*\.json$/;
+const ENDINGS = /\.(md|rs|[mc]?[jt]sx?|py|css|toml)$|^www\/src\/texts\/.*\.json$/;
 /** Files that consist of examples for the rules. */
 const OWN = /^(scripts\/prose\/phrases\.mjs|tests\/js\/prose\.test\.mjs)$/;
 

@@ -21,7 +21,7 @@ const FLOORS = [
   ['texts'],
 ];
 
-const files = readdirSync(SRC, { recursive: true, encoding: 'utf8' }).filter((path) => path.endsWith('.ts'));
+const files = readdirSync(SRC, { recursive: true, encoding: 'utf8' }).filter((path) => /\.tsx?$/.test(path));
 
 /** Returns the relative paths that a file names: imports, types, workers, and files beside it. */
 function named(path: string): string[] {

@@ -13,10 +13,10 @@ import { SEGMENT_EXAMPLES } from '../../www/src/labs/segment/examples';
 import { LabelMap } from '../../www/src/labs/segment/label-map';
 import { labelHead, labelTooth } from '../../www/src/labs/segment/labelling';
 import { fromHash, linkOf, toHash } from '../../www/src/labs/segment/link';
-import type { ToolSettings } from '../../www/src/labs/segment/panels/tools';
 import type { Vec3 } from '../../www/src/labs/segment/protocol';
 import { boxOf, grown, union } from '../../www/src/labs/segment/region';
 import { openImage } from '../../www/src/labs/segment/source';
+import type { ToolSettings } from '../../www/src/labs/segment/tools';
 import { SEGMENT_VIEW } from '../../www/src/labs/segment/view';
 
 const DIMS: Vec3 = [9, 7, 5];

@@ -1,5 +1,7 @@
+import { signal } from '@preact/signals';
 import type { LabelArray } from '../../engine/labels';
 import { freeValue, type KnownLabel, type Label, newLabel, rangeOf } from '../../engine/labels';
+import type { Undoable } from '../../kit/ui/parts';
 import { UndoStack } from '../../lab/undo';
 import type { Axis } from '../../scene/anatomy';
 import type { Grip } from '../../scene/panel';
@@ -7,9 +9,10 @@ import { text } from '../../texts';
 import { flood, floodBox, sweep } from './brush';
 import type { SegmentClient } from './client';
 import { LabelMap, type Patch } from './label-map';
-import { type ToolSettings, usesRange } from './panels/tools';
+import type { LabelsShown } from './panels/labels';
 import type { OpenedLabels, Region, StepUpdate, Vec3, VolumeView } from './protocol';
 import { grown, union } from './region';
+import { type ToolSettings, usesRange } from './tools';
 
 /** Limits of the undo history: number of strokes, and their total size in bytes. */
 const LIMITS = { entries: 200, bytes: 256e6 };
@@ -32,8 +35,6 @@ export interface LabelList {
 
 /** Interface to the lab, as editing needs it. */
 export interface EditedLab {
-  /** Called when the list of labels, or the active one, has changed. */
-  onLabels: () => void;
   /** Called when voxels have changed, before the surfaces follow. */
   onVoxels: () => void;
   /** Called with surfaces that have followed a change; after a large one they are not `smooth` at first. */
@@ -44,7 +45,6 @@ export interface EditedLab {
   onStopped: () => void;
   /** Called when a fill has reached no voxel, with the reason. */
   onNothing: (reason: string) => void;
-  onUndo: (undoable: string | undefined, redoable: string | undefined) => void;
   onError: (title: string, error: unknown) => void;
 }
 
@@ -58,10 +58,10 @@ export class SegmentEditing {
   readonly #undo = new UndoStack<Moment>(LIMITS);
   #map: LabelMap | undefined;
   #spacing: Vec3 = [1, 1, 1];
-  #labels: readonly Label[] = [];
-  #active = 1;
-  /** Labels whose surfaces and voxels are not shown; undo does not affect them. */
-  readonly #hidden = new Set<number>();
+  /** The list of labels. Undo does not affect which are hidden. */
+  readonly list = signal<LabelsShown>({ labels: [], active: 1, hidden: new Set() });
+  /** The names of the changes that undo and redo would affect. */
+  readonly undo = signal<Undoable>({});
   /** Box of the voxels that the worker does not know yet. */
   #unsent: Region | undefined;
   /** Whether the worker has yet to smooth surfaces. */
@@ -83,15 +83,19 @@ export class SegmentEditing {
   }
 
   get labels(): readonly Label[] {
-    return this.#labels;
+    return this.list.peek().labels;
   }
 
   get active(): number {
-    return this.#active;
+    return this.list.peek().active;
   }
 
   get hidden(): ReadonlySet<number> {
-    return this.#hidden;
+    return this.list.peek().hidden;
+  }
+
+  #relist(changed: Partial<LabelsShown>): void {
+    this.list.value = { ...this.list.peek(), ...changed };
   }
 
   get voxels(): LabelArray | undefined {
@@ -137,10 +141,8 @@ export class SegmentEditing {
     const known = new Map(described.map((label) => [label.value, label]));
     const possible = [...known.keys()].filter((value) => value !== 0 && value >= low && value <= high);
     const values = [...new Set([...present, ...possible])].sort((a, b) => a - b);
-    this.#labels = (values.length > 0 ? values : [1]).map((value) => newLabel(value, known.get(value)));
-    this.#active = this.#labels[0]?.value ?? 1;
-    this.#hidden.clear();
-    this.#lab.onLabels();
+    const labels = (values.length > 0 ? values : [1]).map((value) => newLabel(value, known.get(value)));
+    this.list.value = { labels, active: labels[0]?.value ?? 1, hidden: new Set() };
   }
 
   /** Takes over the label map of a session, with its list of labels, and clears the undo history. */
@@ -150,17 +152,14 @@ export class SegmentEditing {
     { labels, active, hidden }: LabelList,
   ): void {
     this.#start(grid, opened);
-    this.#labels = labels;
-    this.#active = active;
-    this.#hidden.clear();
-    for (const value of hidden) this.#hidden.add(value);
-    this.#lab.onLabels();
+    this.list.value = { labels, active, hidden: new Set(hidden) };
   }
 
   /** Takes over the label map opened again after a failure of the engine; the list of labels stays. */
   readopt(grid: Pick<VolumeView, 'dims' | 'spacing'>, opened: OpenedLabels): void {
     this.#start(grid, opened);
-    this.#lab.onLabels();
+    // Shown with the voxels of the other map.
+    this.#relist({});
   }
 
   #start({ dims, spacing }: Pick<VolumeView, 'dims' | 'spacing'>, { map, voxels }: OpenedLabels): void {
@@ -178,7 +177,7 @@ export class SegmentEditing {
   press(at: Vec3, axis: Axis, settings: ToolSettings): Grip | undefined {
     if (!this.#map || settings.tool === 'navigate') return undefined;
     // Nobody wants to paint what cannot be seen.
-    if (settings.tool !== 'eraser' && this.#hidden.has(this.#active)) this.setVisible(this.#active, true);
+    if (settings.tool !== 'eraser' && this.hidden.has(this.active)) this.setVisible(this.active, true);
     if (settings.tool === 'fill') {
       this.#fill(at, axis, settings);
       return { move: () => undefined, drop: () => undefined };
@@ -202,14 +201,14 @@ export class SegmentEditing {
   /** Chooses the label to paint with, if there is such a one. */
   setActive(value: number): void {
     if (!this.labels.some((label) => label.value === value)) return;
-    this.#active = value;
-    this.#lab.onLabels();
+    this.#relist({ active: value });
   }
 
   setVisible(value: number, visible: boolean): void {
-    if (visible) this.#hidden.delete(value);
-    else this.#hidden.add(value);
-    this.#lab.onLabels();
+    const hidden = new Set(this.hidden);
+    if (visible) hidden.delete(value);
+    else hidden.add(value);
+    this.#relist({ hidden });
   }
 
   rename(value: number, name: string): void {
@@ -223,12 +222,11 @@ export class SegmentEditing {
   /** Adds a label without voxels, which the tools paint from now on; returns false if the file's type has no room. */
   add(): boolean {
     if (!this.#map) return false;
-    const label = newLabel(freeValue(this.#labels));
+    const label = newLabel(freeValue(this.labels));
     if (label.value > rangeOf(this.#map.voxels)[1]) return false;
     this.#push(text('segment.adding'), undefined);
-    this.#labels = [...this.#labels, label].sort((a, b) => a.value - b.value);
-    this.#active = label.value;
-    this.#lab.onLabels();
+    const labels = [...this.labels, label].sort((a, b) => a.value - b.value);
+    this.#relist({ labels, active: label.value });
     return true;
   }
 
@@ -240,14 +238,11 @@ export class SegmentEditing {
       map.set(index, 0);
     const patch = map.end();
     this.#push(text('segment.removing'), patch);
-    this.#labels = this.#labels.filter((label) => label.value !== value);
-    this.#hidden.delete(value);
-    if (this.#active === value) this.#active = this.#labels[0]?.value ?? 0;
-    if (this.#labels.length === 0) {
-      this.#labels = [newLabel(1)];
-      this.#active = 1;
-    }
-    this.#lab.onLabels();
+    const rest = this.labels.filter((label) => label.value !== value);
+    const labels = rest.length > 0 ? rest : [newLabel(1)];
+    const hidden = new Set([...this.hidden].filter((one) => one !== value));
+    const isThere = rest.some((label) => label.value === this.active);
+    this.list.value = { labels, hidden, active: isThere ? this.active : (labels[0]?.value ?? 1) };
     if (patch) this.#changed(map.boxOf(patch));
   }
 
@@ -256,21 +251,19 @@ export class SegmentEditing {
     const moment = direction === 'undo' ? this.#undo.past : this.#undo.future;
     // Not in the middle of a stroke, which would then end on other labels.
     if (!this.#map || !moment || this.#map.isChanging) return;
-    const now: Moment = { patch: moment.patch, labels: this.#labels, active: this.#active };
+    const now: Moment = { patch: moment.patch, labels: this.labels, active: this.active };
     const box = moment.patch && this.#map.exchange(moment.patch);
     this.#undo[direction]({ bytes: sizeOf(moment.patch), state: now });
-    this.#labels = moment.labels;
-    this.#active = moment.active;
     this.#notify();
-    this.#lab.onLabels();
+    this.#relist({ labels: moment.labels, active: moment.active });
     if (box) this.#changed(box);
   }
 
   #paint(from: Vec3, to: Vec3, axis: Axis, { tool, radius, shape, protect }: ToolSettings): void {
     const map = this.#map;
     if (!map) return;
-    const value = tool === 'eraser' ? 0 : this.#active;
-    const only = protect ? (tool === 'eraser' ? this.#active : 0) : undefined;
+    const value = tool === 'eraser' ? 0 : this.active;
+    const only = protect ? (tool === 'eraser' ? this.active : 0) : undefined;
     const mask = tool === 'threshold' ? this.mask : undefined;
     // Until the worker has said which voxels are in the range, none is.
     if (tool === 'threshold' && !mask) return;
@@ -298,7 +291,7 @@ export class SegmentEditing {
       this.#lab.onNothing(text('segment.fillKept'));
       return;
     }
-    const visit = (index: number) => map.set(index, this.#active);
+    const visit = (index: number) => map.set(index, this.active);
     const reachable = grown({ min: seed, dims: [1, 1, 1] }, settings.reach, map.dims);
     const box =
       settings.extent === 'slice'
@@ -316,18 +309,17 @@ export class SegmentEditing {
 
   #relabel(what: string, change: (label: Label) => Label): void {
     this.#push(what, undefined);
-    this.#labels = this.#labels.map(change);
-    this.#lab.onLabels();
+    this.#relist({ labels: this.labels.map(change) });
   }
 
   #push(label: string, patch: Patch | undefined): void {
-    const state: Moment = { patch, labels: this.#labels, active: this.#active };
+    const state: Moment = { patch, labels: this.labels, active: this.active };
     this.#undo.push({ label, bytes: sizeOf(patch), state });
     this.#notify();
   }
 
   #notify(): void {
-    this.#lab.onUndo(this.#undo.undoable, this.#undo.redoable);
+    this.undo.value = { undoable: this.#undo.undoable, redoable: this.#undo.redoable };
   }
 
   #changed(box: Region | undefined): void {

@@ -1,3 +1,4 @@
+import { signal } from '@preact/signals';
 import { RequestError, toFailure } from '../../engine/failure';
 import { rgbOf } from '../../engine/labels';
 import { release } from '../../engine/release';
@@ -20,12 +21,12 @@ import type { SegmentExample } from './examples';
 import type { Overlays } from './label-overlay';
 import { linkOf, toHash } from './link';
 import { factsOf, MAP_FACT } from './page';
-import type { LabelMeasures } from './panels/label-measures';
-import { type Tool, type ToolSettings, usesRange } from './panels/tools';
+import type { LabelMeasures, MeasuresShown } from './panels/measures';
 import { type PartEvents, SegmentParts, type SurfaceFormat } from './parts';
 import type { OpenedImage, OpenedLabels, ParamValues, SurfaceUpdate, VolumeView, WorkerEvent } from './protocol';
 import { saveMap, saveSurfaces } from './saving';
 import type { SegmentContent } from './schema';
+import { hasBrush, type Tool, type ToolSettings, Tools, usesRange } from './tools';
 import { SEGMENT_VIEW } from './view';
 
 /** Milliseconds after the last change of an intensity range until the worker is asked which voxels are in it. */
@@ -59,7 +60,12 @@ class SegmentLab implements ShelledLab<SegmentExample> {
   readonly opening: SegmentOpening;
   readonly #data: SegmentData;
   readonly #editing: SegmentEditing;
+  readonly #tools = new Tools();
   readonly #measures = new Map<number, LabelMeasures>();
+  readonly #shown = signal<MeasuresShown>({
+    ...{ labels: [], measures: new Map(), unit: '', more: { latency: {}, updates: 0 } },
+  });
+  readonly #noRoom = signal('');
   #volume: VolumeView | undefined;
   /** Parameters of the surfaces in force. */
   #params: ParamValues = {};
@@ -83,47 +89,50 @@ class SegmentLab implements ShelledLab<SegmentExample> {
   constructor(place: LabPlace) {
     const shell = new LabShell(place, this);
     this.shell = shell;
-    const { root, signal } = shell;
-    const ui = new SegmentParts(root, signal, this.#events());
-    const states = new LabStates(ui.page.banner, ui.page.status, signal);
+    const { root } = shell;
+    const editing = this.#newEditing();
+    this.#editing = editing;
+    const { list, undo } = editing;
+    const shown = { tools: this.#tools, list, undo, refusal: this.#noRoom, measures: this.#shown };
+    const ui = new SegmentParts(root, shell.signal, shown, this.#events());
+    const states = new LabStates(ui.page.banner, ui.page.status, shell.signal);
     this.ui = ui;
     this.states = states;
-    this.#editing = new SegmentEditing(this.client, {
-      onLabels: () => this.#showLabels(),
-      onVoxels: () => ui.view.showLabels(),
+    list.subscribe(() => this.#showLabels());
+    undo.subscribe(({ undoable }) => (undoable ? shell.work.did('painted') : shell.work.settled('painted')));
+    this.#tools.settings.subscribe((settings) => this.#applyTool(settings));
+    this.#data = new SegmentData(this.client, {
+      adopt: (opened, source, reopening) => this.#adopt(opened, source, reopening),
+      labels: () => this.#editing.voxels?.slice(),
+    });
+    this.opening = new Opening(this.client, ui.page, states, this.#data);
+    shell.begin(this.#shortcuts());
+  }
+
+  #newEditing(): SegmentEditing {
+    return new SegmentEditing(this.client, {
+      onVoxels: () => this.ui.view.showLabels(),
       onUpdate: (update, smooth) => {
-        ui.page.warnings.showReport(update);
+        this.ui.page.warnings.showReport(update);
         this.#take(update, smooth);
       },
       onBusy: () => {
-        states.setModelState('running');
+        this.states.setModelState('running');
         this.#sayLater(text('segment.following'));
       },
       onStopped: () => this.#stopped(),
       onNothing: (reason) => {
         this.#isUnfilled = true;
         this.#released = undefined;
-        ui.page.status.say(reason);
-      },
-      onUndo: (undoable, redoable) => {
-        if (undoable) this.shell.work.did('painted');
-        else this.shell.work.settled('painted');
-        ui.tools.showUndo(undoable, redoable);
+        this.ui.page.status.say(reason);
       },
       onError: (title, error) => {
         clearTimeout(this.#busyTimer);
         clearTimeout(this.#cancelTimer);
-        ui.page.offerCancel(false);
-        states.fail(title, error);
+        this.ui.page.offerCancel(false);
+        this.states.fail(title, error);
       },
     });
-    this.#data = new SegmentData(this.client, {
-      adopt: (opened, source, reopening) => this.#adopt(opened, source, reopening),
-      labels: () => this.#editing.voxels?.slice(),
-    });
-    this.opening = new Opening(this.client, ui.page, states, this.#data);
-    this.#applyTool(ui.tools.value);
-    shell.begin(this.#shortcuts());
   }
 
   closed(): void {
@@ -144,16 +153,16 @@ class SegmentLab implements ShelledLab<SegmentExample> {
       onSaveMap: (format) => this.shell.ask(this.#saveMap(format), text('segment.saveFailed')),
       onSaveSurfaces: (format) => this.#saveSurfaces(format),
       onReset: () => void this.#reset(),
-      onActive: (value) => this.#editing.setActive(value),
-      onRename: (value, name) => this.#editing.rename(value, name),
-      onColor: (value, color) => this.#editing.recolor(value, color),
-      onVisible: (value, visible) => this.#editing.setVisible(value, visible),
-      onAdd: () => this.#addLabel(),
-      onRemove: (value) => this.#editing.remove(value),
-      onSettings: (settings) => this.#applyTool(settings),
+      labels: {
+        activate: (value) => this.#editing.setActive(value),
+        rename: (value, name) => this.#editing.rename(value, name),
+        recolor: (value, color) => this.#editing.recolor(value, color),
+        setVisible: (value, visible) => this.#editing.setVisible(value, visible),
+        add: () => this.#addLabel(),
+        remove: (value) => this.#editing.remove(value),
+      },
       onApply: () => this.#apply(),
-      onUndo: () => this.#travel('undo'),
-      onRedo: () => this.#travel('redo'),
+      onTravel: (direction) => this.#travel(direction),
       press: (at, axis) => this.#press(at, axis),
       onPick: (label) => this.#editing.setActive(label),
     };
@@ -164,7 +173,7 @@ class SegmentLab implements ShelledLab<SegmentExample> {
       key,
       shown: key,
       text: what,
-      act: () => this.ui.tools.set({ tool: one }),
+      act: () => this.#tools.set({ tool: one }),
     });
     const travel = (direction: 'undo' | 'redo') => () => this.#travel(direction);
     return [
@@ -173,8 +182,8 @@ class SegmentLab implements ShelledLab<SegmentExample> {
       tool('e', 'eraser', text('segment.eraser')),
       tool('f', 'fill', text('segment.fill')),
       tool('v', 'navigate', text('segment.navigate')),
-      { key: '[', shown: '[', text: text('segment.smallerKey'), act: () => this.ui.tools.changeRadius(-1) },
-      { key: ']', shown: ']', text: text('segment.largerKey'), act: () => this.ui.tools.changeRadius(1) },
+      { key: '[', shown: '[', text: text('segment.smallerKey'), act: () => this.#tools.changeRadius(-1) },
+      { key: ']', shown: ']', text: text('segment.largerKey'), act: () => this.#tools.changeRadius(1) },
       { key: ',', shown: ',', text: text('segment.previousSliceKey'), act: () => this.ui.view.goAlong(-1) },
       { key: '.', shown: '.', text: text('segment.nextSliceKey'), act: () => this.ui.view.goAlong(1) },
       { key: 'p', shown: 'p', text: text('segment.applyKey'), act: () => this.#apply() },
@@ -203,18 +212,18 @@ class SegmentLab implements ShelledLab<SegmentExample> {
     else if (session) this.#resume(opened, contentOf<SegmentContent>(session, 'segment'));
     else {
       this.#editing.adopt(volume, opened, example?.labels ?? []);
-      this.ui.tools.set({ range: example?.range ?? [...volume.window] });
+      this.#tools.set({ range: example?.range ?? [...volume.window] });
       this.ui.options.set({ ...initialOptions(SEGMENT_VIEW), ...linked?.view });
     }
     before.forEach(release);
-    this.#applyTool(this.ui.tools.value);
+    this.#applyTool(this.#tools.value);
     this.#showAll(opened);
   }
 
   /** Continues a session: its list of labels, tools and view. */
   #resume(opened: OpenedImage, { tools, view, ...list }: SegmentContent): void {
     this.#editing.resume(opened.volume, opened, list);
-    if (tools) this.ui.tools.set(tools);
+    if (tools) this.#tools.set(tools);
     this.ui.page.data.setFact(MAP_FACT, text('segment.sessionMap'));
     if (!view) return;
     this.ui.options.set(view.options);
@@ -228,7 +237,7 @@ class SegmentLab implements ShelledLab<SegmentExample> {
     const state = await this.client.request('save', undefined);
     const view = { ...this.ui.view.pose, options: this.ui.options.value };
     const list = { labels, active, hidden: [...hidden] };
-    return { voxels: copy, state, ...list, params: this.#params, tools: this.ui.tools.value, view };
+    return { voxels: copy, state, ...list, params: this.#params, tools: this.#tools.value, view };
   }
 
   /** Opens a label map of the open volume in place of the present one. */
@@ -244,7 +253,7 @@ class SegmentLab implements ShelledLab<SegmentExample> {
       this.#forgetMask();
       this.#editing.adopt(volume, opened, []);
       release(before);
-      this.#applyTool(this.ui.tools.value);
+      this.#applyTool(this.#tools.value);
       this.ui.page.data.setFact(MAP_FACT, opened.labelFile ?? name);
       this.#showAll(opened);
     } catch (error) {
@@ -331,17 +340,16 @@ class SegmentLab implements ShelledLab<SegmentExample> {
   }
 
   #showMeasures(): void {
-    this.ui.measures.show(this.#editing.labels, this.#measures, this.ui.page.unit, {
-      latency: this.#latency,
-      updates: this.#updates,
-    });
+    const more = { latency: this.#latency, updates: this.#updates };
+    const { labels } = this.#editing;
+    this.#shown.value = { labels, measures: this.#measures, unit: this.ui.page.unit, more };
   }
 
   /** Shows the list of labels and their colours everywhere. */
   #showLabels(): void {
     const { labels, active, hidden } = this.#editing;
     const visible = labels.filter(({ value }) => !hidden.has(value));
-    this.ui.labels.show(labels, active, hidden);
+    this.#noRoom.value = '';
     this.ui.view.setAppearance(new Map(labels.map(({ value, color }) => [value, color])), hidden);
     const painted = labels.find(({ value }) => value === active);
     this.ui.view.showLabels({
@@ -355,7 +363,7 @@ class SegmentLab implements ShelledLab<SegmentExample> {
   #press(at: Parameters<PartEvents['press']>[0], axis: Parameters<PartEvents['press']>[1]) {
     if (!this.states.canChange) return undefined;
     this.#isUnfilled = false;
-    const grip = this.#editing.press(at, axis, this.ui.tools.value);
+    const grip = this.#editing.press(at, axis, this.#tools.value);
     if (!grip || this.#isUnfilled) return grip;
     this.#released = undefined;
     this.#latency = {};
@@ -370,18 +378,19 @@ class SegmentLab implements ShelledLab<SegmentExample> {
 
   /** Applies the tool in use at the crosshair: the alternative to the pointer for the keyboard. */
   #apply(): void {
-    const { view, tools } = this.ui;
+    const { view } = this.ui;
+    const settings = this.#tools.value;
     if (!this.states.canChange) return;
-    if (tools.value.tool === 'navigate') this.ui.page.status.say(text('segment.applyNothing'));
+    if (settings.tool === 'navigate') this.ui.page.status.say(text('segment.applyNothing'));
     else {
       this.#latency = {};
       this.#released = performance.now();
-      this.#editing.apply(view.crosshair, view.axial, tools.value);
+      this.#editing.apply(view.crosshair, view.axial, settings);
     }
   }
 
   #addLabel(): void {
-    if (this.states.canChange && !this.#editing.add()) this.ui.labels.showError(text('segment.noRoom'));
+    if (this.states.canChange && !this.#editing.add()) this.#noRoom.value = text('segment.noRoom');
   }
 
   #travel(direction: 'undo' | 'redo'): void {
@@ -394,9 +403,8 @@ class SegmentLab implements ShelledLab<SegmentExample> {
   #applyTool(settings: ToolSettings): void {
     const { tool, radius, shape } = settings;
     const voxel = Math.min(...(this.#volume?.spacing ?? [1]));
-    const hasBrush = tool === 'brush' || tool === 'threshold' || tool === 'eraser';
     // Half a voxel more, as the brush covers.
-    this.ui.view.setBrush(hasBrush ? { radius: (radius + 0.5) * voxel, disc: shape === 'disc' } : undefined);
+    this.ui.view.setBrush(hasBrush(tool) ? { radius: (radius + 0.5) * voxel, disc: shape === 'disc' } : undefined);
     this.shell.root.dataset.tool = tool;
     this.#followRange(settings);
   }
@@ -420,7 +428,7 @@ class SegmentLab implements ShelledLab<SegmentExample> {
       if (mask.length !== this.#editing.voxels?.length) return;
       this.#maskRange = wanted;
       this.#editing.mask = mask;
-      this.#followRange(this.ui.tools.value);
+      this.#followRange(this.#tools.value);
     } catch (error) {
       this.states.fail(text('labs.requestFailed'), error);
     }

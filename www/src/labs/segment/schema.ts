@@ -30,11 +30,25 @@ const range = pipe(
   check(([low, high]) => low <= high),
 );
 const tools = object({
+  /** Effect of pressing a slice: the crosshair moves, or labels change. */
   tool: oneOf({ navigate: true, brush: true, threshold: true, eraser: true, fill: true }),
+  /** Shape of the brush: a ball in the volume, or a disc in the slice. */
   shape: oneOf({ ball: true, disc: true }),
+  /** Extent of a fill: the slice, or a box of the volume. */
   extent: oneOf({ slice: true, box: true }),
-  ...{ radius: real, range, reach: real, inRange: flag, protect: flag },
+  /** Radius of the brush, in shortest sides of a voxel. */
+  radius: real,
+  /** Intensities that the threshold brush paints, and that a fill may be limited to, both included. */
+  range,
+  /** Largest distance of a fill in the volume along each axis, in voxels. */
+  reach: real,
+  /** Whether a fill in the volume is limited to the range of intensities. */
+  inRange: flag,
+  /** Whether only background is painted, and only the active label erased. */
+  protect: flag,
 });
+/** The settings of the tools that change labels. */
+export type ToolSettings = InferOutput<typeof tools>;
 const view = object({ camera, crosshair: vec3, options: viewOptions(SEGMENT_VIEW) });
 /** Files may have 4000, and a few may be added. */
 const most = 4500;
