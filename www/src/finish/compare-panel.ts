@@ -1,5 +1,6 @@
 import { cellOf, type Warning } from '../engine/warnings';
-import { acceptDropsOn, fileChooser, nameOf, readFiles, VOLUME_FILES } from '../importers/files';
+import { fileChooser, VOLUME_FILES } from '../importers/chooser';
+import { acceptDropsOn, nameOf, readFiles } from '../importers/files';
 import { csvOf } from '../kit/csv';
 import { h, uniqueId } from '../kit/dom';
 import { figure } from '../kit/format';

@@ -3,7 +3,7 @@
 import type { Edit, ExportRequest, Measures, Unit, Vec3 } from '../engine/protocol';
 import type { Warning } from '../engine/warnings';
 import { folded } from '../kit/dom';
-import type { MeasurePanel } from '../kit/measures';
+import type { SurfaceMeasures } from '../kit/measures';
 import type { EditedView } from '../scene/edited-view';
 import { text } from '../texts';
 import { ReferencePanel } from './compare-panel';
@@ -17,7 +17,7 @@ export interface FinishHost {
   /** Returns the lab's surface as a PLY file. */
   mesh: () => Promise<Uint8Array>;
   view: EditedView;
-  measures: MeasurePanel;
+  measures: SurfaceMeasures;
   /** Returns the warnings that concern the surface. */
   warnings: () => readonly Warning[];
   save: (extension: string, bytes: Uint8Array, type: string, suffix: string) => void;

@@ -1,35 +1,9 @@
 import type { NamedBytes } from '../engine/protocol';
 import { areSmall } from '../engine/small-files';
-import { h, uniqueId } from '../kit/dom';
 import { type Dropped, readFolders } from '../kit/folders';
-import { text } from '../texts';
 import { type Admission, admitted, isOfSmallFiles, notesOf } from '.';
 
 export { nameOf } from '../kit/folders';
-
-/** Endings of files of volumes. */
-export const VOLUME_FILES = '.nii,.gz,.nrrd,.nhdr,.mha,.mhd,.hdr,.img,.raw,.zraw,.dcm,.dicom,.ima,.tif,.tiff';
-
-/**
- * Creates a button with the given label that chooses one file, or several that belong together, of the endings in `accept`,
- * by default those of volumes, or a session.
- */
-export function fileChooser(
-  onFiles: (files: File[]) => void,
-  accept = VOLUME_FILES,
-  label = text('controls.openFile'),
-  admission: Admission = 'volume',
-): HTMLElement {
-  const id = uniqueId('file');
-  const input = h('input', { type: 'file', id, multiple: true, accept: `${accept},.zip`, class: 'visually-hidden' });
-  input.addEventListener('change', () => {
-    const files = [...(input.files ?? [])];
-    // Makes choosing the same file again a change.
-    input.value = '';
-    if (files.length > 0) void letIn(files, admission).then((opened) => opened && onFiles(opened));
-  });
-  return h('span', { class: 'chooser' }, input, h('label', { for: id, class: 'button' }, label));
-}
 
 /** Options of accepting files that are dropped. */
 interface DropOptions {
@@ -39,12 +13,12 @@ interface DropOptions {
 }
 
 /**
- * Accepts files dropped anywhere on the page, until `signal` is aborted, and shows `overlay` while files are dragged
+ * Accepts files dropped anywhere on the page, until `signal` is aborted; `onOver` is told whether files are dragged
  * over the page or folders are read. All files in a folder are passed on, or of other programs' formats the volume that the
  * user chooses; a folder that is an OME-Zarr image is passed to `onFolder`, if given, in browsers that have handles of folders.
  */
 export function acceptDrops(
-  overlay: HTMLElement,
+  onOver: (isOver: boolean) => void,
   onFiles: (files: File[]) => void,
   signal: AbortSignal,
   { admission = 'volume', onFolder }: DropOptions = {},
@@ -55,14 +29,14 @@ export function acceptDrops(
     (event) => {
       if (!hasFiles(event)) return;
       event.preventDefault();
-      overlay.hidden = false;
+      onOver(true);
     },
     { signal },
   );
   window.addEventListener(
     'dragleave',
     (event) => {
-      if (!event.relatedTarget) overlay.hidden = true;
+      if (!event.relatedTarget) onOver(false);
     },
     { signal },
   );
@@ -72,7 +46,7 @@ export function acceptDrops(
     // If a folder cannot be read, opening it as a file gives the error message.
     const dropped = (await folders?.catch(() => undefined)) ?? { files };
     if (drop !== drops || signal.aborted) return;
-    overlay.hidden = true;
+    onOver(false);
     if ('zarr' in dropped) return onFolder?.(dropped.zarr);
     const opened = await letIn(dropped.files, admission);
     if (drop === drops && !signal.aborted && opened) onFiles(opened);
@@ -80,11 +54,11 @@ export function acceptDrops(
   window.addEventListener(
     'drop',
     (event) => {
-      overlay.hidden = true;
+      onOver(false);
       if (!hasFiles(event)) return;
       event.preventDefault();
       const folders = readFolders(event.dataTransfer, onFolder !== undefined);
-      overlay.hidden = !folders;
+      onOver(folders !== undefined);
       void open(folders, [...(event.dataTransfer?.files ?? [])]);
     },
     { signal },
@@ -110,7 +84,7 @@ export function acceptDropsOn(element: HTMLElement, onDrop: (data: DataTransfer 
 const refused = new WeakMap<readonly File[], Error>();
 
 /** Returns the files to open; undefined if the user cancels. */
-async function letIn(files: File[], admission: Admission): Promise<File[] | undefined> {
+export async function letIn(files: File[], admission: Admission): Promise<File[] | undefined> {
   try {
     return await admitted(files, admission);
   } catch (error) {

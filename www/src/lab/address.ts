@@ -1,6 +1,6 @@
 /** Reads and writes the page's address; its hash names the open lab and contains its settings. */
 
-import type { StatusLine } from '../kit/status';
+import type { Status } from '../kit/status';
 import { text } from '../texts';
 
 /** Ids of the labs, as they appear in addresses. */
@@ -31,7 +31,7 @@ export const FILE_NOTE = text('labs.linkLacksFile');
  * Copies the page's address to the clipboard, and reports it in the status line, followed by `notes` on what the link
  * lacks (false: none); if the clipboard is not available, refers to the address bar.
  */
-export async function copyAddress(status: StatusLine, notes: (string | false)[]): Promise<void> {
+export async function copyAddress(status: Status, notes: (string | false)[]): Promise<void> {
   const say = (done: string) => status.say([done, ...notes].filter(Boolean).join(' '));
   try {
     await navigator.clipboard.writeText(location.href);

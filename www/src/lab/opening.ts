@@ -1,7 +1,7 @@
 import { toFailure } from '../engine/failure';
 import type { Failure, NamedBytes, ParamSpec, Unit } from '../engine/protocol';
 import type { Warning } from '../engine/warnings';
-import type { ErrorBanner, StatusLine } from '../kit/status';
+import type { Banner, Status } from '../kit/status';
 import { text } from '../texts';
 import type { Handoff } from './lab';
 import { LinkError, readLink } from './link-query';
@@ -46,8 +46,8 @@ export interface Source<Example, Linked, Data> {
 /** The controls of a lab that opening data affects. */
 interface OpeningParts<Example> {
   makeParams(specs: ParamSpec[]): void;
-  banner: ErrorBanner;
-  status: StatusLine;
+  banner: Banner;
+  status: Status;
   data: { choose(example: Example | undefined): void };
 }
 

@@ -4,8 +4,8 @@ import { anyForeign, noted } from '../importers';
 import { readFiles } from '../importers/files';
 import { isLesson } from '../importers/lessons';
 import { ENDING, isNamedSession, isSession } from '../importers/sessions';
-import type { ErrorBanner, StatusLine } from '../kit/status';
-import type { WarningList } from '../kit/warnings';
+import type { Banner, Status } from '../kit/status';
+import type { Warnings } from '../kit/warnings';
 import { text } from '../texts';
 import type { LabId } from './address';
 import type { Captured, Handoff, OpenInLab } from './lab';
@@ -19,7 +19,7 @@ import type { Work, WorkKind } from './work';
 /** A lab, as its sessions need it. */
 interface SessionLab<Example> {
   id: LabId;
-  page: { banner: ErrorBanner; status: StatusLine; saving: Saving; warnings: WarningList };
+  page: { banner: Banner; status: Status; saving: Saving; warnings: Warnings };
   /** The controls of its run, if it has one. */
   run?: { readonly finish: Finish | undefined };
   states: LabStates;

@@ -1,6 +1,6 @@
 import { toFailure } from '../engine/failure';
 import { type LabState, Observable } from '../kit/state';
-import type { ErrorBanner, StatusLine } from '../kit/status';
+import type { Banner, Status } from '../kit/status';
 import { text } from '../texts';
 
 /**
@@ -9,8 +9,8 @@ import { text } from '../texts';
  */
 export class LabStates {
   readonly #state = new Observable<LabState>('loading');
-  readonly #banner: ErrorBanner;
-  readonly #status: StatusLine;
+  readonly #banner: Banner;
+  readonly #status: Status;
   readonly #signal: AbortSignal;
   /** State of the model, also while the lab displays an error; 'loading' until there is a model. */
   #model: 'loading' | 'running' | 'paused' | 'done' = 'loading';
@@ -30,7 +30,7 @@ export class LabStates {
   engineBroken = false;
 
   /** Once `signal` is aborted, because the lab is closed, no failure is displayed any more. */
-  constructor(banner: ErrorBanner, status: StatusLine, signal: AbortSignal) {
+  constructor(banner: Banner, status: Status, signal: AbortSignal) {
     this.#banner = banner;
     this.#status = status;
     this.#signal = signal;

@@ -1,6 +1,7 @@
 /** The lessons' panel beside the labs: a list of lessons, or one that is open. */
 import './lessons.css';
-import { acceptDropsOn, fileChooser } from '../importers/files';
+import { fileChooser } from '../importers/chooser';
+import { acceptDropsOn } from '../importers/files';
 import { h, uniqueId } from '../kit/dom';
 import { LESSON_GUIDE } from '../kit/guides';
 import { LANGUAGE, plural, text, textNodes } from '../texts';

@@ -1,6 +1,6 @@
 /** Small parts that the views of all labs consist of. */
-import type { ButtonHTMLAttributes, ComponentChildren, JSX } from 'preact';
-import { useId } from 'preact/hooks';
+import type { ReadonlySignal } from '@preact/signals';
+import type { ButtonHTMLAttributes, ComponentChildren } from 'preact';
 import { text } from '../../texts';
 
 /** An icon from an SVG path on a 24 by 24 grid; decorative only, hidden from screen readers. */
@@ -19,6 +19,24 @@ export function Section({ title, children }: { title: string; children: Componen
       <h2>{title}</h2>
       {children}
     </section>
+  );
+}
+
+interface FoldedProps {
+  title: string;
+  isOpen?: boolean | ReadonlySignal<boolean>;
+  children: ComponentChildren;
+}
+
+/** A section of a column that is collapsed until the user opens it. */
+export function Folded({ title, isOpen = false, children }: FoldedProps) {
+  return (
+    <details class="panel" open={typeof isOpen === 'boolean' ? isOpen : isOpen.value}>
+      <summary>
+        <h2>{title}</h2>
+      </summary>
+      {children}
+    </details>
   );
 }
 
@@ -82,44 +100,30 @@ export function Travel({ direction, undo: { undoable, redoable }, hasWord = fals
   );
 }
 
-/** A label with its control in a row; `control` gets the id that the label is for. */
-export function Row({
-  label,
-  title,
-  children,
-}: {
-  label: string;
-  title?: string;
-  children: (id: string) => JSX.Element;
-}) {
-  const id = useId();
-  return (
-    <div title={title}>
-      <div class="row">
-        <label for={id}>{label}</label>
-        <span class="value">{children(id)}</span>
-      </div>
-    </div>
-  );
-}
-
 interface SelectProps<Value extends string> {
   choices: Readonly<Record<Value, string>>;
   value: Value;
   onChoose: (value: Value) => void;
+  /** Values whose entries are hidden. */
+  hidden?: readonly string[];
+  /** Values whose entries are disabled. */
+  disabledChoices?: readonly string[];
   id?: string;
   disabled?: boolean;
   'aria-label'?: string;
+  'aria-describedby'?: string;
+  'aria-invalid'?: 'true' | undefined;
   [data: `data-${string}`]: string | undefined;
 }
 
 /** A selection list of labelled values. */
-export function Select<Value extends string>({ choices, value, onChoose, ...props }: SelectProps<Value>) {
+export function Select<Value extends string>(given: SelectProps<Value>) {
+  const { choices, value, onChoose, hidden = [], disabledChoices = [], ...props } = given;
   const entries = Object.entries(choices) as [Value, string][];
   return (
     <select {...props} value={value} onChange={({ currentTarget }) => onChoose(currentTarget.value as Value)}>
       {entries.map(([one, label]) => (
-        <option key={one} value={one}>
+        <option key={one} value={one} hidden={hidden.includes(one)} disabled={disabledChoices.includes(one)}>
           {label}
         </option>
       ))}

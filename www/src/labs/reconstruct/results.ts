@@ -119,7 +119,7 @@ export class ReconstructResults {
 
   #showMeasures({ measures, fit }: MeasuredEvent): void {
     if (measures) this.#ui.measures.showMeasures(measures);
-    this.#ui.measures.showExtra(fitValues(fit));
+    this.#ui.measures.extra.value = fitValues(fit);
     this.#ui.showChoice(fit.choice);
     this.#ui.warning.textContent = fit.warning ?? '';
   }
@@ -130,7 +130,7 @@ export class ReconstructResults {
     this.#ui.page.warnings.showReport(last);
     this.#ui.phases.update(this.#history, this.#states.value === 'running');
     this.#ui.plots.update();
-    this.#ui.run.csv.disabled = this.#history.reports.length === 0;
+    this.#ui.run.hasPlots.value = this.#history.reports.length > 0;
   }
 
   /**

@@ -88,7 +88,7 @@ export class SculptResults {
     const { bands, folded, missed, ...others } = facts;
     Object.assign(this.#more, others, this.#support === 'membrane' && { bands, folded, missed });
     this.#ui.measures.showMeasures(measures);
-    this.#ui.measures.showExtra(this.#more);
+    this.#ui.measures.extra.value = this.#more;
   }
 
   showState(state: LabState): void {
@@ -153,7 +153,7 @@ export class SculptResults {
     this.#more.frameMs = frame.durationMs;
     const last = frame.reports.at(-1);
     if (last) measures.showReport({ ...last, vertices: frame.result.vertices, triangles: frame.result.triangles });
-    measures.showExtra(this.#more);
+    measures.extra.value = this.#more;
     if (performance.now() - this.#shownAt > SHOW_EVERY) this.#showHistory();
   }
 
@@ -171,6 +171,6 @@ export class SculptResults {
     this.#ui.run.transport.showReport(last);
     this.#ui.page.warnings.showReport(last);
     this.#ui.plots.update();
-    this.#ui.run.csv.disabled = this.#history.reports.length === 0;
+    this.#ui.run.hasPlots.value = this.#history.reports.length > 0;
   }
 }

@@ -495,7 +495,7 @@ class SegmentLab implements ShelledLab<SegmentExample> {
   }
 
   #saveSurfaces(format: SurfaceFormat, recentre = false): void {
-    this.ui.offer.hide();
+    this.ui.offer.value = undefined;
     const surfaces = this.ui.view.surfaces();
     const space = this.#volume ? spaceOf(this.#volume, this.ui.page.unit) : {};
     const saving = saveSurfaces(
@@ -508,7 +508,7 @@ class SegmentLab implements ShelledLab<SegmentExample> {
     const offering = saving.catch((error) => {
       const [first] = surfaces.values();
       if (toFailure(error).code !== 'precision' || !first) throw error;
-      this.ui.offer.show(format, first.origin, () => this.#saveSurfaces(format, true));
+      this.ui.offer.value = { format, origin: first.origin, save: () => this.#saveSurfaces(format, true) };
     });
     this.shell.ask(offering, text('segment.saveFailed'));
   }

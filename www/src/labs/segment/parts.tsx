@@ -1,12 +1,14 @@
 import { type ReadonlySignal, signal } from '@preact/signals';
-import { fileChooser } from '../../importers/files';
-import { h, section, wideButton } from '../../kit/dom';
-import { RecentreOffer } from '../../kit/exports';
+import { FileChooser } from '../../importers/chooser';
+import { h } from '../../kit/dom';
+import { RecentreOffer, type Recentring } from '../../kit/exports';
 import type { LabState } from '../../kit/state';
-import { elementOf } from '../../kit/ui/mount';
-import { Button, Help, type Undoable } from '../../kit/ui/parts';
+import { Made } from '../../kit/ui/mount';
+import { Button, Help, Section, type Undoable } from '../../kit/ui/parts';
 import { initialOptions } from '../../kit/view';
-import { OptionControls } from '../../kit/view-options';
+import { OptionControls, ViewOptions } from '../../kit/view-options';
+import { WarningList } from '../../kit/warnings';
+import { DataPanel } from '../../lab/example-panel';
 import { type LabEvents, LabPage } from '../../lab/page';
 import { text } from '../../texts';
 import type { SegmentExample } from './examples';
@@ -61,16 +63,19 @@ export class SegmentParts {
 
   readonly #slices = h('div', { class: 'slices' });
   readonly view: SegmentView;
-  readonly options: OptionControls<typeof SEGMENT_VIEW>;
-  readonly offer = new RecentreOffer();
+  readonly options: ViewOptions<typeof SEGMENT_VIEW>;
+  /** An offer to save surfaces moved to the origin. */
+  readonly offer = signal<Recentring | undefined>(undefined);
   /** Whether there are labels, and nothing is being loaded. */
   readonly #isReady = signal(false);
 
   constructor(root: HTMLElement, closed: AbortSignal, shown: Shown, events: PartEvents) {
-    const choosers = [
-      fileChooser(events.onFiles, undefined, text('segment.openVolume'), 'labelled'),
-      fileChooser(events.onMapFiles, undefined, text('segment.openMap')),
-    ];
+    const choosers = (
+      <>
+        <FileChooser onFiles={events.onFiles} label={text('segment.openVolume')} admission="labelled" />
+        <FileChooser onFiles={events.onMapFiles} label={text('segment.openMap')} />
+      </>
+    );
     this.page = new LabPage(root, closed, events, {
       viewLabel: text('segment.viewLabel'),
       drop: text('segment.drop'),
@@ -79,46 +84,59 @@ export class SegmentParts {
       sessionHelp: text('segment.sessionHelp'),
     });
     this.view = new SegmentView(this.page.canvas, this.#slices, initialOptions(SEGMENT_VIEW), events);
-    this.options = new OptionControls(SEGMENT_VIEW, (options) => {
+    this.options = new ViewOptions(SEGMENT_VIEW, (options) => {
       this.view.setOptions(options);
       events.onOptions();
     });
-    this.page.warnings.actions = { label: events.labels.activate, point: (point) => this.view.goTo(point) };
+    this.page.warnings.actions.value = { label: events.labels.activate, point: (point) => this.view.goTo(point) };
     const { tools, list, refusal, undo, measures } = shown;
     const isReady = this.#isReady;
-    const reset = wideButton(text('segment.reset'), 'reset', events.onReset);
-    reset.title = text('segment.resetHelp');
     this.page.layOut({
       name: 'segment',
-      options: this.options.element,
-      stage: (view, status) => [
-        elementOf(<ToolBar {...{ tools, undo }} onTravel={events.onTravel} />),
-        h('div', { class: 'four' }, view, this.#slices),
-        status,
-      ],
-      setup: [
-        section(text('segment.sectionLabels'), elementOf(<LabelList {...{ list, refusal }} acts={events.labels} />)),
-        section(
-          text('segment.sectionTool'),
-          elementOf(<ToolSettings {...{ tools, isReady }} onApply={events.onApply} />),
-        ),
-        section(text('segment.sectionVolume'), this.page.data.element, reset),
-        this.page.paramsSection(),
-      ],
-      results: [
-        section(
-          text('segment.sectionMeasures'),
-          this.page.warnings.element,
-          elementOf(<LabelMeasureTable shown={measures} />),
-        ),
-        section(text('segment.sectionMap'), elementOf(<MapExports isReady={isReady} onSave={events.onSaveMap} />)),
-        section(
-          text('segment.sectionSurfaces'),
-          elementOf(<SurfaceExports isReady={isReady} onSave={events.onSaveSurfaces} />),
-          this.offer.element,
-        ),
-        this.page.saveSection(this.view.subject),
-      ],
+      options: <OptionControls of={this.options} />,
+      stage: (view, status) => (
+        <>
+          <ToolBar {...{ tools, undo }} onTravel={events.onTravel} />
+          <div class="four">
+            {view}
+            <Made of={this.#slices} />
+          </div>
+          {status}
+        </>
+      ),
+      setup: (
+        <>
+          <Section title={text('segment.sectionLabels')}>
+            <LabelList {...{ list, refusal }} acts={events.labels} />
+          </Section>
+          <Section title={text('segment.sectionTool')}>
+            <ToolSettings {...{ tools, isReady }} onApply={events.onApply} />
+          </Section>
+          <Section title={text('segment.sectionVolume')}>
+            <DataPanel data={this.page.data} />
+            <Button class="wide" data-action="reset" title={text('segment.resetHelp')} onClick={events.onReset}>
+              {text('segment.reset')}
+            </Button>
+          </Section>
+          {this.page.paramsSection()}
+        </>
+      ),
+      results: (
+        <>
+          <Section title={text('segment.sectionMeasures')}>
+            <WarningList warnings={this.page.warnings} />
+            <LabelMeasureTable shown={measures} />
+          </Section>
+          <Section title={text('segment.sectionMap')}>
+            <MapExports isReady={isReady} onSave={events.onSaveMap} />
+          </Section>
+          <Section title={text('segment.sectionSurfaces')}>
+            <SurfaceExports isReady={isReady} onSave={events.onSaveSurfaces} />
+            <RecentreOffer offer={this.offer} />
+          </Section>
+          {this.page.saveSection(this.view.subject)}
+        </>
+      ),
     });
   }
 
@@ -130,7 +148,7 @@ export class SegmentParts {
   showState(state: LabState, ready: boolean): void {
     const idle = this.page.showLoading(state, ready);
     this.#isReady.value = idle;
-    if (!idle) this.offer.hide();
+    if (!idle) this.offer.value = undefined;
   }
 
   dispose(): void {

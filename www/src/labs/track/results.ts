@@ -179,7 +179,7 @@ export class TrackResults {
     if (tracked) measures.showMeasures(tracked.measures);
     else measures.clear();
     const { noise } = this;
-    measures.showExtra(moreOf({ frames: this.#frames, count, frame: this.#frame, closing: this.#closing, noise }));
+    measures.extra.value = moreOf({ frames: this.#frames, count, frame: this.#frame, closing: this.#closing, noise });
     this.showCurve();
     this.showFigures();
     const last = this.#history.reports.at(-1);

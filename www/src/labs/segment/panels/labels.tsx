@@ -1,6 +1,6 @@
 import type { ReadonlySignal } from '@preact/signals';
-import { useId } from 'preact/hooks';
 import type { Label } from '../../../engine/labels';
+import { useId } from '../../../kit/ui/id';
 import { kept } from '../../../kit/ui/mount';
 import { Button, Help, IconButton, Refusal } from '../../../kit/ui/parts';
 import { text } from '../../../texts';

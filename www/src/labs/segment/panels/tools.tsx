@@ -1,6 +1,7 @@
 import { type ReadonlySignal, useSignal } from '@preact/signals';
-import { useId } from 'preact/hooks';
-import { Button, Help, Refusal, Row, Select, Travel, type Undoable } from '../../../kit/ui/parts';
+import { Check, Field, NumberInput } from '../../../kit/ui/field';
+import { useId } from '../../../kit/ui/id';
+import { Button, Help, Refusal, Select, Travel, type Undoable } from '../../../kit/ui/parts';
 import { text } from '../../../texts';
 import { hasBrush, MOST_RADIUS, MOST_REACH, type Tool, type Tools, usesRange } from '../tools';
 
@@ -83,63 +84,59 @@ export function ToolSettings({ tools, isReady, onApply }: SettingsProps) {
         {TOOLS.find((one) => one.tool === tool)?.help}
       </p>
       {hasBrush(tool) && (
-        <Row label={text('segment.shape')}>
-          {(id) => (
+        <Field isRow label={text('segment.shape')}>
+          {(tied) => (
             <Select
-              {...{ id, choices: SHAPES, value: shape, 'data-tool-setting': 'shape' }}
+              {...{ ...tied, choices: SHAPES, value: shape, 'data-tool-setting': 'shape' }}
               onChoose={(chosen) => tools.set({ shape: chosen })}
             />
           )}
-        </Row>
+        </Field>
       )}
       {tool === 'fill' && (
-        <Row label={text('segment.extent')}>
-          {(id) => (
+        <Field isRow label={text('segment.extent')}>
+          {(tied) => (
             <Select
-              {...{ id, choices: EXTENTS, value: extent, 'data-tool-setting': 'extent' }}
+              {...{ ...tied, choices: EXTENTS, value: extent, 'data-tool-setting': 'extent' }}
               onChoose={(chosen) => tools.set({ extent: chosen })}
             />
           )}
-        </Row>
+        </Field>
       )}
       {isBoxFill && (
-        <Row label={text('segment.reach')} title={text('segment.reachHelp')}>
-          {(id) => (
-            <input
-              {...{ type: 'number', id, min: 1, max: MOST_REACH, step: 1, value: reach, 'data-tool-setting': 'reach' }}
-              onChange={({ currentTarget }) => {
-                tools.set({ reach: currentTarget.valueAsNumber });
-                currentTarget.valueAsNumber = tools.value.reach;
+        <Field isRow label={text('segment.reach')} title={text('segment.reachHelp')}>
+          {(tied) => (
+            <NumberInput
+              {...{ ...tied, min: 1, max: MOST_REACH, step: 1, shown: String(reach), 'data-tool-setting': 'reach' }}
+              onEnter={(value, input) => {
+                tools.set({ reach: value });
+                input.valueAsNumber = tools.value.reach;
               }}
             />
           )}
-        </Row>
+        </Field>
       )}
       {isBoxFill && (
-        <Check name="in-range" label={text('segment.inRange')} on={inRange} set={(on) => tools.set({ inRange: on })} />
+        <Check
+          data-tool-setting="in-range"
+          label={text('segment.inRange')}
+          on={inRange}
+          set={(on) => tools.set({ inRange: on })}
+        />
       )}
       {usesRange(tools.value) && <Range tools={tools} />}
-      <Check name="protect" label={text('segment.protect')} on={protect} set={(on) => tools.set({ protect: on })} />
+      <Check
+        data-tool-setting="protect"
+        label={text('segment.protect')}
+        on={protect}
+        set={(on) => tools.set({ protect: on })}
+      />
       <Help>{text('segment.protectHelp')}</Help>
       <Button class="wide" data-action="apply" disabled={!isReady.value} onClick={onApply}>
         {text('segment.apply')}
       </Button>
       <Help>{text('segment.applyHelp')}</Help>
     </div>
-  );
-}
-
-function Check({ name, label, on, set }: { name: string; label: string; on: boolean; set: (on: boolean) => void }) {
-  return (
-    <label class="check">
-      <input
-        type="checkbox"
-        data-tool-setting={name}
-        checked={on}
-        onChange={({ currentTarget }) => set(currentTarget.checked)}
-      />
-      {label}
-    </label>
   );
 }
 

@@ -1,15 +1,16 @@
+import type { ComponentChildren } from 'preact';
 import { lengths, milliseconds } from '../../kit/format';
-import { ExamplePanel, type Fact } from '../../lab/example-panel';
+import { type Fact, OpenData } from '../../lab/example-panel';
 import { text } from '../../texts';
 import { IMAGES, type TrackExample } from './examples';
 import { TRACK_PRESETS } from './presets';
 import type { OpenedImage } from './protocol';
 
-/** Creates the panel that opens examples and, by `chooser`, files. */
+/** Returns the data that the lab opens: examples and, by `chooser`, files. */
 export function imageData(
-  chooser: HTMLElement,
+  chooser: ComponentChildren,
   onExample: (example: TrackExample) => void,
-): ExamplePanel<TrackExample> {
+): OpenData<TrackExample> {
   const contents = {
     groups: [
       { label: text('track.groupImages'), examples: IMAGES },
@@ -23,10 +24,10 @@ export function imageData(
       text('track.factPrepared'),
       text('track.factOpening'),
     ],
-    choosers: [chooser],
+    choosers: chooser,
     help: text('track.dropHelp'),
   };
-  return new ExamplePanel<TrackExample>(contents, onExample);
+  return new OpenData<TrackExample>(contents, onExample);
 }
 
 /** Returns the facts about an open image. */

@@ -1,14 +1,17 @@
+import { type ReadonlySignal, signal } from '@preact/signals';
+import type { ComponentChildren } from 'preact';
 import { toFailure } from '../engine/failure';
 import type { ExportRequest, Unit } from '../engine/protocol';
 import type { Warning } from '../engine/warnings';
 import { Finish } from '../finish';
-import { h } from '../kit/dom';
-import { ExportButtons, RECENTRED } from '../kit/exports';
+import { ExportButtons, Exports, RECENTRED } from '../kit/exports';
 import type { History } from '../kit/history';
-import type { MeasurePanel } from '../kit/measures';
+import type { SurfaceMeasures } from '../kit/measures';
 import type { CodeEvents } from '../kit/session';
 import type { LabState } from '../kit/state';
-import { Transport, type TransportEvents } from '../kit/transport';
+import { RunState, Transport, type TransportEvents } from '../kit/transport';
+import { Made } from '../kit/ui/mount';
+import { Button } from '../kit/ui/parts';
 import type { EditedView } from '../scene/edited-view';
 import type { PictureSubject } from '../scene/pictures';
 import { text } from '../texts';
@@ -22,7 +25,7 @@ interface OwnRunEvents extends TransportEvents, CodeEvents {}
 export interface RunEvents<Example> extends LabEvents<Example>, OwnRunEvents {}
 
 /** The page of the lab, as the controls of a run use it. */
-type RunPage = Pick<LabPage<never>, 'unit' | 'session' | 'saving' | 'warnings' | 'saveSection' | 'showLoading'>;
+type RunPage = Pick<LabPage<never>, 'unit' | 'code' | 'saving' | 'warnings' | 'saveSection' | 'showLoading'>;
 
 interface RunOptions {
   history: History;
@@ -39,12 +42,13 @@ interface RunOptions {
 /** Controls of a lab whose model runs, besides those of its page: the run, and its surface. */
 export class RunControls {
   readonly #page: RunPage;
-  readonly transport: Transport;
-  readonly exports: ExportButtons;
-  readonly csv: HTMLButtonElement;
+  readonly transport = new RunState();
+  readonly exports: Exports;
+  /** Whether there are data of plots to save. */
+  readonly hasPlots = signal(false);
   readonly history: History;
   readonly #options: RunOptions;
-  readonly #onRun: () => void;
+  readonly #events: OwnRunEvents;
   #space: SurfaceSpace = {};
   #edited: EditedView | undefined;
   finish: Finish | undefined;
@@ -52,21 +56,27 @@ export class RunControls {
   onSurfaceSaved: () => void = () => undefined;
 
   constructor(page: RunPage, events: OwnRunEvents & Pick<LabEvents<never>, 'onError'>, options: RunOptions) {
-    const { history, residual } = options;
+    const { history } = options;
     this.#page = page;
     this.#options = options;
     this.history = history;
-    this.transport = new Transport(events);
-    page.session.addCode(events);
-    this.#onRun = events.onToggle;
-    this.exports = new ExportButtons((request, type) => {
+    this.#events = events;
+    page.code = events;
+    this.exports = new Exports((request, type) => {
       this.#save(request, type).catch((error) => events.onError(text('labs.saveFailed'), error));
     });
-    this.csv = h(
-      'button',
-      { type: 'button', disabled: true, onclick: () => page.saving.plots(history, page.warnings.all, residual) },
-      text('labs.plotData'),
-    );
+  }
+
+  /** The controls of the run. */
+  get controls(): ComponentChildren {
+    return <Transport run={this.transport} events={this.#events} />;
+  }
+
+  /** The button that saves the data of the plots. */
+  get plotData(): ComponentChildren {
+    const { saving, warnings } = this.#page;
+    const save = () => saving.plots(this.history, warnings.all, this.#options.residual);
+    return <PlotData isEnabled={this.hasPlots} onSave={save} />;
   }
 
   /** Unit of length of the data and of the surface; empty if unknown. */
@@ -82,7 +92,7 @@ export class RunControls {
 
   set surfaceSpace(space: SurfaceSpace) {
     this.#space = space;
-    this.exports.space = space.space;
+    this.exports.of(space.space);
   }
 
   /** Returns the surface, edited if it is, as a file. */
@@ -106,16 +116,22 @@ export class RunControls {
     }
   }
 
-  /** Creates the section that saves and shares results, with pictures and films of `subject`. */
-  saveSection(subject: PictureSubject, ...elements: HTMLElement[]): HTMLElement {
-    return this.#page.saveSection(subject, [this.exports.element, ...elements], this.#onRun);
+  /** Returns the section that saves and shares results, with pictures and films of `subject`. */
+  saveSection(subject: PictureSubject, more?: ComponentChildren): ComponentChildren {
+    const views = (
+      <>
+        <ExportButtons exports={this.exports} />
+        {more}
+      </>
+    );
+    return this.#page.saveSection(subject, views, this.#events.onToggle);
   }
 
   /**
-   * Creates the sections that edit the surface after a run and compare it with a reference. `onOpen` is called before
+   * Returns the sections that edit the surface after a run and compare it with a reference. `onOpen` is called before
    * the surface is taken.
    */
-  finishSections(view: EditedView, measures: MeasurePanel, onOpen = () => {}): HTMLElement[] {
+  finishSections(view: EditedView, measures: SurfaceMeasures, onOpen = () => {}): ComponentChildren {
     const mesh = () => {
       onOpen();
       return this.#options.fetchMesh({ format: 'ply', ...this.#space });
@@ -128,7 +144,7 @@ export class RunControls {
       warnings: () => this.surfaceWarnings,
       save: (...file) => this.#page.saving.bytes(...file),
     });
-    return this.finish.elements;
+    return this.finish.elements.map((element, index) => <Made key={index} of={element} />);
   }
 
   /**
@@ -158,4 +174,12 @@ export class RunControls {
   showWarnings(): void {
     this.#page.warnings.showReport(this.history.reports.at(-1));
   }
+}
+
+function PlotData({ isEnabled, onSave }: { isEnabled: ReadonlySignal<boolean>; onSave: () => void }) {
+  return (
+    <Button disabled={!isEnabled.value} onClick={onSave}>
+      {text('labs.plotData')}
+    </Button>
+  );
 }

@@ -5,7 +5,8 @@ import type { Edit, ParamSpec, ParamValues, SurfacePoint, Unit, Vec3 } from '../
 import { h } from '../kit/dom';
 import { download } from '../kit/download';
 import { figure } from '../kit/format';
-import { ParamControls } from '../kit/params';
+import { ParamControls, Params } from '../kit/params';
+import { elementOf } from '../kit/ui/mount';
 import type { EditedView } from '../scene/edited-view';
 import { plural, text } from '../texts';
 import { ComponentList } from './component-list';
@@ -46,9 +47,9 @@ export class EditPanel {
   readonly #remeshing: ParamValues = { edge: 1 };
   readonly #smoothing: ParamValues = { iterations: 10, keepVolume: true };
   readonly #cutting: ParamValues = { axis: 'z', position: 50, side: SIDES[0] };
-  readonly #decimationForm: ParamControls;
-  readonly #boundedForm: ParamControls;
-  readonly #remeshingForm: ParamControls;
+  readonly #decimationForm: Form;
+  readonly #boundedForm: Form;
+  readonly #remeshingForm: Form;
   readonly #measuring: HTMLInputElement;
   readonly #choosing: HTMLInputElement;
   #from: SurfacePoint | undefined;
@@ -210,9 +211,9 @@ export class EditPanel {
     this.#decimation.targetTriangles = Math.max(4, Math.round(info.triangles / 2));
     this.#bounded.maxDistance = Number((info.edge.mean / 10).toPrecision(2));
     this.#remeshing.edge = Number(info.edge.mean.toPrecision(3));
-    this.#decimationForm.show(this.#decimation);
-    this.#boundedForm.show(this.#bounded);
-    this.#remeshingForm.show(this.#remeshing);
+    this.#decimationForm.show();
+    this.#boundedForm.show();
+    this.#remeshingForm.show();
   }
 
   #enable(): void {
@@ -343,14 +344,24 @@ function spec(
   return { name, type, label, help, default: undefined, ...more };
 }
 
+interface Form {
+  element: HTMLElement;
+  /** Shows the values. */
+  show: () => void;
+}
+
 /** Creates controls that keep `values` up to date. */
-function form(values: ParamValues, specs: ParamSpec[], onChange: () => void = () => undefined): ParamControls {
-  const controls = new ParamControls(specs, [], (name, value) => {
+function form(values: ParamValues, specs: ParamSpec[], onChange: () => void = () => undefined): Form {
+  const params = new Params();
+  const show = () => params.show(values);
+  params.specs.value = specs;
+  show();
+  const change = (name: string, value: unknown) => {
     values[name] = value;
+    show();
     onChange();
-  });
-  controls.show(values);
-  return controls;
+  };
+  return { element: elementOf(<ParamControls params={params} skip={[]} onChange={change} />), show };
 }
 
 function group(title: string, controls: HTMLElement, buttons: HTMLButtonElement[]): HTMLElement {

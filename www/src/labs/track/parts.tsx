@@ -1,12 +1,17 @@
+import { type ReadonlySignal, signal } from '@preact/signals';
 import { concerning } from '../../engine/warnings';
-import { fileChooser } from '../../importers/files';
-import { folded, h, section, wideButton } from '../../kit/dom';
-import { FigurePanel } from '../../kit/figure';
+import { FileChooser } from '../../importers/chooser';
+import { h } from '../../kit/dom';
 import type { History } from '../../kit/history';
-import { MeasurePanel } from '../../kit/measures';
+import { MeasureTable, SurfaceMeasures } from '../../kit/measures';
 import type { LabState } from '../../kit/state';
+import { FigureOf } from '../../kit/ui/figure';
+import { Made } from '../../kit/ui/mount';
+import { Button, Folded, Section } from '../../kit/ui/parts';
 import { initialOptions } from '../../kit/view';
-import { OptionControls } from '../../kit/view-options';
+import { OptionControls, ViewOptions } from '../../kit/view-options';
+import { WarningList } from '../../kit/warnings';
+import { DataPanel } from '../../lab/example-panel';
 import { LabPage } from '../../lab/page';
 import { RunControls, type RunEvents } from '../../lab/run-controls';
 import { spaceOf, unitOf } from '../../lab/surface-space';
@@ -49,9 +54,9 @@ export class TrackParts {
 
   readonly #slices = h('div', { class: 'slices' });
   readonly view: TrackView;
-  readonly measures = new MeasurePanel(TRACK_ROWS);
+  readonly measures = new SurfaceMeasures();
   readonly table = new FrameTable();
-  readonly options: OptionControls<typeof TRACK_VIEW>;
+  readonly options: ViewOptions<typeof TRACK_VIEW>;
   readonly preparation: PreparationControls;
   readonly region: RegionControls;
   readonly object: ObjectChoice;
@@ -60,10 +65,12 @@ export class TrackParts {
   readonly stills: FigureRow;
   readonly compare: TrackComparePanel;
   readonly #onParam: PartEvents['onParam'];
-  readonly #figure: FigurePanel<TrackVariant, TrackPreset>;
-  readonly #saves: HTMLButtonElement[];
-  readonly #sculpt: HTMLButtonElement;
-  readonly #thresholdHolder = h('div');
+  readonly #figure = signal<{ preset: TrackPreset | undefined; variant: TrackVariant | undefined }>({
+    ...{ preset: undefined, variant: undefined },
+  });
+  /** What can be saved: all frames, and the surface of the one shown. */
+  readonly #saves = signal({ all: false, here: false });
+  readonly #thresholdHolder = h('div', { class: 'made' });
   #threshold: EdgeThreshold | undefined;
   /**
    * Half width k, in voxels, of the windows in which the tracker finds the boundary; the preview of an edge threshold
@@ -76,7 +83,7 @@ export class TrackParts {
       viewLabel: text('track.viewLabel'),
       drop: text('track.drop'),
       admission: 'frames',
-      data: imageData(fileChooser(events.onFiles, undefined, undefined, 'frames'), events.onExample),
+      data: imageData(<FileChooser onFiles={events.onFiles} admission="frames" />, events.onExample),
       ownControls: ['threshold'],
       onParams: (specs) => this.#makeThreshold(specs),
     });
@@ -88,7 +95,6 @@ export class TrackParts {
     });
     this.view = new TrackView(this.page.canvas, this.#slices, initialOptions(TRACK_VIEW));
     this.#onParam = events.onParam;
-    this.#figure = new FigurePanel<TrackVariant, TrackPreset>(events.onVariant);
     this.preparation = new PreparationControls(events.onPreparation);
     this.region = new RegionControls(events);
     this.object = new ObjectChoice(events);
@@ -104,13 +110,7 @@ export class TrackParts {
     this.curve = new VolumeCurve(stopAt);
     this.stills = new FigureRow((voxel: Vec3) => this.view.goToVoxel(voxel), stopAt);
     this.compare = new TrackComparePanel({ onStart: events.onCompare, onCancel: events.onCancelCompare });
-    this.#saves = [
-      wideButton(text('track.saveFrames'), 'save-frames', () => events.onSave('frames')),
-      wideButton(text('track.saveAnimation'), 'save-animation', () => events.onSave('animation')),
-      wideButton(text('track.saveTable'), 'save-table', () => events.onSave('table')),
-    ];
-    this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
-    this.options = new OptionControls(TRACK_VIEW, (options) => {
+    this.options = new ViewOptions(TRACK_VIEW, (options) => {
       this.view.setOptions(options);
       this.#slices.hidden = options.below !== 'slices';
       this.stills.below = options.below;
@@ -118,30 +118,52 @@ export class TrackParts {
     });
     this.view.onRegion = (region: VoxelBox) => events.onRegion(region);
     this.view.onMoved = events.onMoved;
-    this.page.warnings.actions = { frame: stopAt, point: (point) => this.view.goTo(point) };
+    this.page.warnings.actions.value = { frame: stopAt, point: (point) => this.view.goTo(point) };
     this.page.layOut({
       name: 'track',
-      options: this.options.element,
-      over: [this.view.editing.legend.element],
-      stage: (view, status) => [
-        ...[view, this.frames.element, this.run.transport.element, status],
-        ...[this.object.element, this.#slices, this.stills.element],
-      ],
-      setup: [
-        section(text('track.sectionImage'), this.page.data.element, this.#figure.element),
-        section(text('track.sectionBoundary'), this.#thresholdHolder),
-        section(text('track.sectionRegion'), this.region.element),
-        folded(text('track.sectionPreparation'), this.preparation.element),
-        this.page.paramsSection(),
-      ],
-      results: [
-        section(text('track.sectionCurve'), this.curve.element, this.table.warnings),
-        section(text('track.sectionSurface'), this.page.warnings.element, this.measures.element),
-        this.run.saveSection(this.view.subject, ...this.#saves, this.#sculpt),
-        ...this.run.finishSections(this.view.editing, this.measures, () => this.frames.stop()),
-        folded(text('labs.frames'), this.table.element),
-        folded(text('track.sectionCompare'), this.compare.element),
-      ],
+      options: <OptionControls of={this.options} />,
+      over: <Made of={this.view.editing.legend.element} />,
+      stage: (view, status) => (
+        <>
+          {view}
+          {made([this.frames])}
+          {this.run.controls}
+          {status}
+          {made([this.object])}
+          <Made of={this.#slices} />
+          {made([this.stills])}
+        </>
+      ),
+      setup: (
+        <>
+          <Section title={text('track.sectionImage')}>
+            <DataPanel data={this.page.data} />
+            <FigureOf shown={this.#figure} onVariant={events.onVariant} />
+          </Section>
+          <Section title={text('track.sectionBoundary')}>
+            <Made of={this.#thresholdHolder} />
+          </Section>
+          <Section title={text('track.sectionRegion')}>{made([this.region])}</Section>
+          <Folded title={text('track.sectionPreparation')}>{made([this.preparation])}</Folded>
+          {this.page.paramsSection()}
+        </>
+      ),
+      results: (
+        <>
+          <Section title={text('track.sectionCurve')}>
+            {made([this.curve])}
+            <Made of={this.table.warnings} />
+          </Section>
+          <Section title={text('track.sectionSurface')}>
+            <WarningList warnings={this.page.warnings} />
+            <MeasureTable measures={this.measures} extra={TRACK_ROWS} />
+          </Section>
+          {this.run.saveSection(this.view.subject, <Saves can={this.#saves} events={events} />)}
+          {this.run.finishSections(this.view.editing, this.measures, () => this.frames.stop())}
+          <Folded title={text('labs.frames')}>{made([this.table])}</Folded>
+          <Folded title={text('track.sectionCompare')}>{made([this.compare])}</Folded>
+        </>
+      ),
     });
   }
 
@@ -153,14 +175,14 @@ export class TrackParts {
       (value) => this.#onParam('threshold', value),
       (value) => this.view.preview(value, this.#window),
     );
-    this.#thresholdHolder.replaceWith(this.#threshold.element);
+    this.#thresholdHolder.replaceChildren(this.#threshold.element);
   }
 
   /** Shows the facts about a newly opened image. */
   adopt(opened: OpenedImage, example: TrackExample | undefined, name: string): void {
     const unit = example?.unit ?? unitOf(opened.volume);
     this.page.saving.name = example?.id ?? name;
-    this.measures.unit = unit;
+    this.measures.unit.value = unit;
     this.run.unit = unit;
     this.run.surfaceSpace = spaceOf(opened.volume, unit);
     this.page.data.show(factsOf(opened, name, unit), example);
@@ -173,7 +195,7 @@ export class TrackParts {
   }
 
   showFigure(preset: TrackPreset | undefined, variant: TrackVariant | undefined): void {
-    this.#figure.show(preset, variant);
+    this.#figure.value = { preset, variant };
   }
 
   refuseParam(name: string, message: string): void {
@@ -188,12 +210,11 @@ export class TrackParts {
   showState(state: LabState, beneath: LabState, ready: boolean, tracked: number, here: boolean): void {
     const idle = this.run.showState(state, beneath, ready, here);
     this.run.exports.enabled = idle && here;
-    this.#sculpt.disabled = !idle || !here;
+    this.#saves.value = { all: idle && tracked > 0, here: idle && here };
     // While the lab asks for the object, there is nothing to run.
     if (this.object.open) this.run.transport.showState(beneath, false);
     this.object.enabled = idle;
     this.region.enabled = idle;
-    for (const save of this.#saves) save.disabled = !idle || tracked === 0;
     this.compare.enabled = idle && beneath === 'done';
   }
 
@@ -203,3 +224,25 @@ export class TrackParts {
     this.view.dispose();
   }
 }
+
+/** Buttons that save all frames, or pass on the surface of one. */
+function Saves({ can, events }: { can: ReadonlySignal<{ all: boolean; here: boolean }>; events: PartEvents }) {
+  const { all, here } = can.value;
+  const save = (what: 'frames' | 'animation' | 'table', label: string) => (
+    <Button class="wide" data-action={`save-${what}`} disabled={!all} onClick={() => events.onSave(what)}>
+      {label}
+    </Button>
+  );
+  return (
+    <>
+      {save('frames', text('track.saveFrames'))}
+      {save('animation', text('track.saveAnimation'))}
+      {save('table', text('track.saveTable'))}
+      <Button class="wide" data-action="sculpt" disabled={!here} onClick={events.onSculpt}>
+        {text('labs.openInSculpt')}
+      </Button>
+    </>
+  );
+}
+
+const made = (all: { element: HTMLElement }[]) => all.map(({ element }, index) => <Made key={index} of={element} />);

@@ -1,13 +1,18 @@
+import { type ReadonlySignal, signal } from '@preact/signals';
 import type { ImplicitChoice } from 'vesicle';
-import { fileChooser } from '../../importers/files';
-import { folded, h, section, wideButton } from '../../kit/dom';
-import { FigurePanel } from '../../kit/figure';
+import { FileChooser } from '../../importers/chooser';
+import { h } from '../../kit/dom';
 import type { History } from '../../kit/history';
-import { MeasurePanel } from '../../kit/measures';
+import { MeasureTable, SurfaceMeasures } from '../../kit/measures';
 import { Plots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
+import { FigureOf } from '../../kit/ui/figure';
+import { Made } from '../../kit/ui/mount';
+import { Button, Folded, Section } from '../../kit/ui/parts';
 import { initialOptions } from '../../kit/view';
-import type { OptionControls } from '../../kit/view-options';
+import type { ViewOptions } from '../../kit/view-options';
+import { WarningList } from '../../kit/warnings';
+import { DataPanel } from '../../lab/example-panel';
 import { LabPage } from '../../lab/page';
 import { RunControls, type RunEvents } from '../../lab/run-controls';
 import { text } from '../../texts';
@@ -15,7 +20,7 @@ import type { ReconstructClient } from './client';
 import type { CloudExample } from './examples';
 import { FIT_ROWS, RESIDUAL_PLOT } from './measures';
 import { cloudData, factsOf } from './page';
-import { cloudOptions, offerCameras } from './panels/cloud-options';
+import { CloudOptions, cloudOptions, offerCameras } from './panels/cloud-options';
 import { type CloudChoice, CloudSetup } from './panels/cloud-setup';
 import { EditTools } from './panels/edit-tools';
 import { KernelPlot } from './panels/kernel-plot';
@@ -48,19 +53,21 @@ export class ReconstructParts {
 
   readonly view: ReconstructionView;
   readonly phases = new PhaseList();
-  readonly measures = new MeasurePanel(FIT_ROWS);
+  readonly measures = new SurfaceMeasures();
   readonly warning = h('p', { class: 'warning', role: 'status', 'data-warning': '' });
   readonly setup: CloudSetup;
-  readonly options: OptionControls<typeof CLOUD_VIEW>;
+  readonly options: ViewOptions<typeof CLOUD_VIEW>;
   readonly photos: PhotoStrip;
   readonly tools: EditTools;
   readonly plots: Plots;
   readonly timing: TimingPanel;
   readonly #events: PartEvents;
-  readonly #figure: FigurePanel<CloudVariant, CloudPreset>;
+  readonly #figure = signal<{ preset: CloudPreset | undefined; variant: CloudVariant | undefined }>({
+    ...{ preset: undefined, variant: undefined },
+  });
   readonly #kernel = new KernelPlot();
-  /** Buttons that need a complete surface. */
-  readonly #uses: HTMLButtonElement[];
+  /** Whether there is a complete surface. */
+  readonly #hasSurface = signal(false);
   #photographs: readonly Photograph[] = [];
   #choice: ImplicitChoice | undefined;
   #params: ParamValues = {};
@@ -70,7 +77,7 @@ export class ReconstructParts {
       viewLabel: text('reconstruct.viewLabel'),
       drop: text('reconstruct.drop'),
       admission: 'any',
-      data: cloudData(fileChooser(events.onFiles, ACCEPT, undefined, 'any'), events.onExample),
+      data: cloudData(<FileChooser onFiles={events.onFiles} accept={ACCEPT} admission="any" />, events.onExample),
     });
     this.run = new RunControls(this.page, events, {
       history,
@@ -83,37 +90,53 @@ export class ReconstructParts {
     this.tools = new EditTools((tool) => this.#setTool(tool !== 'none'), events.onTakeBack);
     this.plots = new Plots(history, [RESIDUAL_PLOT], false);
     this.timing = new TimingPanel(client, events.onError);
-    this.#figure = new FigurePanel<CloudVariant, CloudPreset>(events.onVariant);
     this.options = cloudOptions((options) => {
       this.view.setOptions(options);
       events.onOptions(options);
     });
     this.photos = new PhotoStrip((index) => this.#lookThrough(index));
     this.view.onLeave = () => this.photos.choose(undefined);
-    this.#uses = [
-      wideButton(text('reconstruct.saveVolume'), 'volume', events.onSaveVolume),
-      wideButton(text('reconstruct.openInExtract'), 'extract', events.onPassOn),
-      wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt),
-    ];
     this.page.layOut({
       name: 'reconstruct',
-      options: this.options.element,
-      over: [this.view.legend.element, this.view.editing.legend.element],
-      beside: [this.photos.large],
-      stage: (view, status) => [view, this.run.transport.element, status, this.warning, this.photos.element],
-      setup: [
-        section(text('reconstruct.points'), this.page.data.element, this.#figure.element, this.setup.element),
-        this.page.paramsSection(true),
-        section(text('reconstruct.sectionEdits'), this.tools.element),
-      ],
-      results: [
-        section(text('labs.sectionProgress'), this.phases.element),
-        section(text('labs.sectionSurface'), this.page.warnings.element, this.measures.element),
-        this.run.saveSection(this.view.subject, ...this.#uses),
-        ...this.run.finishSections(this.view.editing, this.measures),
-        section(text('labs.sectionPlots'), this.plots.element, this.#kernel.element, this.run.csv),
-        folded(text('reconstruct.sectionTiming'), this.timing.element),
-      ],
+      options: <CloudOptions of={this.options} />,
+      over: made([this.view.legend, this.view.editing.legend]),
+      beside: <Made of={this.photos.large} />,
+      stage: (view, status) => (
+        <>
+          {view}
+          {this.run.controls}
+          {status}
+          <Made of={this.warning} />
+          {made([this.photos])}
+        </>
+      ),
+      setup: (
+        <>
+          <Section title={text('reconstruct.points')}>
+            <DataPanel data={this.page.data} />
+            <FigureOf shown={this.#figure} onVariant={events.onVariant} />
+            {made([this.setup])}
+          </Section>
+          {this.page.paramsSection(true)}
+          <Section title={text('reconstruct.sectionEdits')}>{made([this.tools])}</Section>
+        </>
+      ),
+      results: (
+        <>
+          <Section title={text('labs.sectionProgress')}>{made([this.phases])}</Section>
+          <Section title={text('labs.sectionSurface')}>
+            <WarningList warnings={this.page.warnings} />
+            <MeasureTable measures={this.measures} extra={FIT_ROWS} />
+          </Section>
+          {this.run.saveSection(this.view.subject, <Uses hasSurface={this.#hasSurface} events={events} />)}
+          {this.run.finishSections(this.view.editing, this.measures)}
+          <Section title={text('labs.sectionPlots')}>
+            {made([this.plots, this.#kernel])}
+            {this.run.plotData}
+          </Section>
+          <Folded title={text('reconstruct.sectionTiming')}>{made([this.timing])}</Folded>
+        </>
+      ),
     });
   }
 
@@ -123,7 +146,7 @@ export class ReconstructParts {
     this.page.warnings.showData(warnings);
     this.#photographs = photographs;
     this.page.saving.name = name;
-    this.measures.unit = '';
+    this.measures.unit.value = '';
     const cameras = photographs.map((one) => one.view);
     this.view.setCloud({ points, colors, cameras, up: example?.up ?? 'z', front: example?.front ?? 1 });
     offerCameras(this.options, photographs.length > 0);
@@ -146,7 +169,7 @@ export class ReconstructParts {
     this.page.showParams(params);
     const isMulti = params.kernel === 'multi-order';
     this.page.hideParams({ sigma: params.kernel !== 'gaussian', delta: !isMulti, tau: !isMulti });
-    this.#figure.show(preset, variant);
+    this.#figure.value = { preset, variant };
     this.#showKernel();
   }
 
@@ -168,7 +191,7 @@ export class ReconstructParts {
     const idle = this.run.showState(state, beneath, ready, surface);
     this.timing.enabled = idle;
     this.run.exports.enabled = surface;
-    for (const button of this.#uses) button.disabled = !surface;
+    this.#hasSurface.value = surface;
   }
 
   dispose(): void {
@@ -186,3 +209,21 @@ export class ReconstructParts {
     this.#events.onPhotograph();
   }
 }
+
+/** Buttons that need a complete surface. */
+function Uses({ hasSurface, events }: { hasSurface: ReadonlySignal<boolean>; events: PartEvents }) {
+  const use = (name: string, label: string, act: () => void) => (
+    <Button class="wide" data-action={name} disabled={!hasSurface.value} onClick={act}>
+      {label}
+    </Button>
+  );
+  return (
+    <>
+      {use('volume', text('reconstruct.saveVolume'), events.onSaveVolume)}
+      {use('extract', text('reconstruct.openInExtract'), events.onPassOn)}
+      {use('sculpt', text('labs.openInSculpt'), events.onSculpt)}
+    </>
+  );
+}
+
+const made = (all: { element: HTMLElement }[]) => all.map(({ element }, index) => <Made key={index} of={element} />);

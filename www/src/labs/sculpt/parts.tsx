@@ -1,14 +1,19 @@
+import { signal } from '@preact/signals';
 import type { Texture } from 'three';
 import type { Warning } from '../../engine/warnings';
-import { fileChooser } from '../../importers/files';
-import { h, section } from '../../kit/dom';
-import { FigurePanel } from '../../kit/figure';
+import { FileChooser } from '../../importers/chooser';
+import { h } from '../../kit/dom';
 import type { History } from '../../kit/history';
-import { MeasurePanel } from '../../kit/measures';
+import { MeasureTable, SurfaceMeasures } from '../../kit/measures';
 import { Plots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
+import { FigureOf } from '../../kit/ui/figure';
+import { Made } from '../../kit/ui/mount';
+import { Section } from '../../kit/ui/parts';
 import { initialOptions } from '../../kit/view';
-import { OptionControls } from '../../kit/view-options';
+import { OptionControls, ViewOptions } from '../../kit/view-options';
+import { WarningList } from '../../kit/warnings';
+import { DataPanel } from '../../lab/example-panel';
 import { LabPage } from '../../lab/page';
 import { RunControls, type RunEvents } from '../../lab/run-controls';
 import { text } from '../../texts';
@@ -46,15 +51,17 @@ export class SculptParts {
   readonly view: SculptureView;
   readonly carrier: SurfaceCarrier;
   readonly latency = new DragLatency();
-  readonly measures = new MeasurePanel(SCULPT_ROWS);
+  readonly measures = new SurfaceMeasures();
   readonly previewNote = h('p', { class: 'coarse', hidden: true }, text('sculpt.coarsePreview'));
-  readonly options: OptionControls<typeof SCULPT_VIEW>;
+  readonly options: ViewOptions<typeof SCULPT_VIEW>;
   readonly ellipsoids: EllipsoidControls;
   readonly film: FilmControls;
   readonly support: SupportControl;
   readonly plots: Plots;
   readonly #onError: PartEvents['onError'];
-  readonly #figure: FigurePanel<SculptVariant, SculptPreset>;
+  readonly #figure = signal<{ preset: SculptPreset | undefined; variant: SculptVariant | undefined }>({
+    ...{ preset: undefined, variant: undefined },
+  });
   readonly #captions = h('div', { class: 'captions', hidden: true });
   /** Counts textures, so that one that is still being decoded does not replace a newer one. */
   #pictures = 0;
@@ -65,7 +72,7 @@ export class SculptParts {
       viewLabel: text('sculpt.viewLabel'),
       drop: text('sculpt.drop'),
       admission: 'any',
-      data: sceneData(fileChooser(events.onFiles, ACCEPT, undefined, 'any'), events.onExample),
+      data: sceneData(<FileChooser onFiles={events.onFiles} accept={ACCEPT} admission="any" />, events.onExample),
     });
     this.run = new RunControls(this.page, events, {
       history,
@@ -75,33 +82,58 @@ export class SculptParts {
     this.view = new SculptureView(this.page.canvas, initialOptions(SCULPT_VIEW));
     this.carrier = new SurfaceCarrier(this.view);
     this.#onError = events.onError;
-    this.#figure = new FigurePanel<SculptVariant, SculptPreset>(events.onVariant);
     this.ellipsoids = new EllipsoidControls(events);
     this.film = new FilmControls(events);
     this.support = new SupportControl(events.onSupport);
     this.plots = new Plots(history, SCULPT_PLOTS, true);
-    this.options = new OptionControls(SCULPT_VIEW, (options) => {
+    this.options = new ViewOptions(SCULPT_VIEW, (options) => {
       this.view.setOptions(options);
       events.onOptions(options);
     });
     this.view.onCaptions = (captions) => this.#showCaptions(captions);
     this.page.layOut({
       name: 'sculpt',
-      options: this.options.element,
-      over: [this.view.legend.element, this.view.editing.legend.element, this.previewNote, this.#captions],
-      stage: (view, status) => [view, this.run.transport.element, status],
-      setup: [
-        section(text('sculpt.sectionScene'), this.page.data.element, this.support.element, this.#figure.element),
-        section(text('sculpt.sectionEllipsoids'), this.ellipsoids.element),
-        section(text('sculpt.sectionFilm'), this.film.element),
-        this.page.paramsSection(),
-      ],
-      results: [
-        section(text('labs.sectionSurface'), this.page.warnings.element, this.measures.element),
-        this.run.saveSection(this.view.subject),
-        ...this.run.finishSections(this.view.editing, this.measures),
-        section(text('labs.sectionPlots'), this.plots.element, this.run.csv),
-      ],
+      options: <OptionControls of={this.options} />,
+      over: [this.view.legend.element, this.view.editing.legend.element, this.previewNote, this.#captions].map(
+        (element, index) => <Made key={index} of={element} />,
+      ),
+      stage: (view, status) => (
+        <>
+          {view}
+          {this.run.controls}
+          {status}
+        </>
+      ),
+      setup: (
+        <>
+          <Section title={text('sculpt.sectionScene')}>
+            <DataPanel data={this.page.data} />
+            <Made of={this.support.element} />
+            <FigureOf shown={this.#figure} onVariant={events.onVariant} />
+          </Section>
+          <Section title={text('sculpt.sectionEllipsoids')}>
+            <Made of={this.ellipsoids.element} />
+          </Section>
+          <Section title={text('sculpt.sectionFilm')}>
+            <Made of={this.film.element} />
+          </Section>
+          {this.page.paramsSection()}
+        </>
+      ),
+      results: (
+        <>
+          <Section title={text('labs.sectionSurface')}>
+            <WarningList warnings={this.page.warnings} />
+            <MeasureTable measures={this.measures} extra={SCULPT_ROWS} />
+          </Section>
+          {this.run.saveSection(this.view.subject)}
+          {this.run.finishSections(this.view.editing, this.measures)}
+          <Section title={text('labs.sectionPlots')}>
+            <Made of={this.plots.element} />
+            {this.run.plotData}
+          </Section>
+        </>
+      ),
     });
   }
 
@@ -114,7 +146,7 @@ export class SculptParts {
   ): void {
     this.page.saving.name = example?.id ?? name;
     this.page.warnings.showData(known, warnings);
-    this.measures.unit = '';
+    this.measures.unit.value = '';
     this.support.hasChoice = hasChoice;
     this.view.setScene(box, example?.up ?? 'y', start, [pose, ...posesOf(example)]);
     this.#showTexture(texture);
@@ -148,7 +180,7 @@ export class SculptParts {
 
   showParams(params: ParamValues, preset: SculptPreset | undefined, variant: SculptVariant | undefined): void {
     this.page.showParams(params);
-    this.#figure.show(preset, variant);
+    this.#figure.value = { preset, variant };
   }
 
   /**
@@ -158,7 +190,7 @@ export class SculptParts {
   showState(state: LabState, beneath: LabState, ready: boolean, canPlay: boolean): void {
     const idle = this.run.showState(state, beneath === 'done' && canPlay ? 'paused' : beneath, ready);
     // Saving pauses a run, which would then not go on to the same pose.
-    this.page.session.enabled = idle && beneath !== 'running';
+    this.page.canSave.value = idle && beneath !== 'running';
   }
 
   dispose(): void {

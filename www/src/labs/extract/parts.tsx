@@ -1,14 +1,19 @@
+import { type ReadonlySignal, signal } from '@preact/signals';
 import type { Attractor, ParamValues, Plane, VolumeView } from '../../engine/protocol';
-import { fileChooser } from '../../importers/files';
-import { folded, h, section, wideButton } from '../../kit/dom';
-import { FigurePanel } from '../../kit/figure';
+import { FileChooser } from '../../importers/chooser';
+import { h } from '../../kit/dom';
 import { COVERAGE_GUIDE } from '../../kit/guides';
 import type { History } from '../../kit/history';
-import { MeasurePanel } from '../../kit/measures';
+import { MeasureTable, SurfaceMeasures } from '../../kit/measures';
 import { ENERGY_PLOTS, Plots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
+import { FigureOf } from '../../kit/ui/figure';
+import { Made } from '../../kit/ui/mount';
+import { Button, Folded, Section } from '../../kit/ui/parts';
 import { initialOptions } from '../../kit/view';
-import { OptionControls } from '../../kit/view-options';
+import { OptionControls, ViewOptions } from '../../kit/view-options';
+import { WarningList } from '../../kit/warnings';
+import { DataPanel } from '../../lab/example-panel';
 import { LabPage } from '../../lab/page';
 import { RunControls, type RunEvents } from '../../lab/run-controls';
 import { spaceOf, unitOf } from '../../lab/surface-space';
@@ -58,7 +63,7 @@ export class ExtractParts {
   readonly #labels: LabelsOffer;
   readonly #slices = h('div', { class: 'slices' });
   readonly stage: Stage;
-  readonly measures = new MeasurePanel();
+  readonly measures = new SurfaceMeasures();
   readonly large: LargeSourceControls;
   /** Number of frames of the open volume. */
   #frameCount = 1;
@@ -67,26 +72,28 @@ export class ExtractParts {
   readonly start: StartControls;
   readonly pyramid: PyramidPanel;
   readonly attractors: AttractorControls;
-  readonly options: OptionControls<typeof EXTRACT_VIEW>;
+  readonly options: ViewOptions<typeof EXTRACT_VIEW>;
   readonly compare: ComparePanel;
   readonly coverage: CoveragePanel;
-  readonly #figure: FigurePanel<Variant, Preset>;
-  readonly #sculpt: HTMLButtonElement;
+  readonly #figure = signal<{ preset: Preset | undefined; variant: Variant | undefined }>({
+    ...{ preset: undefined, variant: undefined },
+  });
+  readonly #isReady = signal(false);
   readonly #plots: Plots;
   readonly #times = new TimeTable();
   readonly #log = new EventLog();
-  readonly #compareHolder: HTMLDetailsElement;
+  readonly #isComparing = signal(false);
 
   constructor(root: HTMLElement, history: History, client: ExtractClient, signal: AbortSignal, events: PartEvents) {
     const large = new LargeSourceControls(events.onLarge);
     const frames = new FrameChoice(events.onFrame);
-    const chooser = fileChooser(events.onFiles);
+    const more = [frames, large].map(({ element }, index) => <Made key={index} of={element} />);
     this.page = new LabPage(root, signal, events, {
       viewLabel: text('extract.viewLabel'),
       drop: text('extract.drop'),
       admission: 'volume',
       onFolder: (folder) => events.onLarge(folder.name, { zarr: folder }),
-      data: extractData(chooser, [frames.element, large.element], events.onExample),
+      data: extractData(<FileChooser onFiles={events.onFiles} />, more, events.onExample),
       ownControls: ['iso'],
     });
     this.run = new RunControls(this.page, events, {
@@ -97,7 +104,6 @@ export class ExtractParts {
     this.#frames = frames;
     this.#labels = new LabelsOffer(events.onSegment);
     this.stage = new Stage(this.page.canvas, this.#slices, initialOptions(EXTRACT_VIEW), events.onPlanes);
-    this.#figure = new FigurePanel<Variant, Preset>(events.onVariant);
     this.histogram = new Histogram((iso) => events.onParam('iso', iso));
     this.start = new StartControls(events.onStart);
     this.pyramid = new PyramidPanel(
@@ -111,7 +117,7 @@ export class ExtractParts {
       onGoTo: (point) => this.stage.goTo(point),
       crosshair: () => this.stage.crosshair,
     });
-    this.options = new OptionControls(EXTRACT_VIEW, (options) => {
+    this.options = new ViewOptions(EXTRACT_VIEW, (options) => {
       this.stage.setOptions(options);
       events.onOptions(options);
     });
@@ -123,33 +129,54 @@ export class ExtractParts {
       onGoTo: (point) => this.stage.lookAt(point),
       onMark: (parts) => this.stage.showUncovered(parts),
     });
-    this.#compareHolder = folded(text('extract.sectionCompare'), this.compare.element);
-    this.#sculpt = wideButton(text('labs.openInSculpt'), 'sculpt', events.onSculpt);
     this.#plots = new Plots(history, ENERGY_PLOTS, true);
-    this.page.warnings.actions = { point: (point) => this.stage.goTo(point) };
+    this.page.warnings.actions.value = { point: (point) => this.stage.goTo(point) };
     this.page.layOut({
       name: 'extract',
-      options: this.options.element,
-      over: [this.stage.legend.element, this.stage.editing.legend.element],
-      stage: (view, status) => [view, this.run.transport.element, status, this.#slices],
-      setup: [
-        section(text('extract.sectionData'), this.page.data.element, this.#labels.element, this.#figure.element),
-        section(text('extract.sectionIntensities'), this.histogram.element),
-        section(text('extract.sectionStart'), this.start.element),
-        section(text('extract.sectionPyramid'), this.pyramid.element),
-        section(text('extract.sectionAttractors'), this.attractors.element),
-        this.page.paramsSection(true),
-      ],
-      results: [
-        section(text('labs.sectionSurface'), this.page.warnings.element, this.measures.element),
-        section(text('extract.sectionCoverage'), this.coverage.element),
-        this.run.saveSection(this.stage.subject, this.#sculpt),
-        ...this.run.finishSections(this.stage.editing, this.measures),
-        section(text('labs.sectionProgress'), this.#plots.element, this.run.csv),
-        section(text('extract.sectionEvents'), this.#log.element),
-        section(text('extract.sectionTimes'), this.#times.element),
-        this.#compareHolder,
-      ],
+      options: <OptionControls of={this.options} />,
+      over: made([this.stage.legend, this.stage.editing.legend]),
+      stage: (view, status) => (
+        <>
+          {view}
+          {this.run.controls}
+          {status}
+          <Made of={this.#slices} />
+        </>
+      ),
+      setup: (
+        <>
+          <Section title={text('extract.sectionData')}>
+            <DataPanel data={this.page.data} />
+            {made([this.#labels])}
+            <FigureOf shown={this.#figure} onVariant={events.onVariant} />
+          </Section>
+          <Section title={text('extract.sectionIntensities')}>{made([this.histogram])}</Section>
+          <Section title={text('extract.sectionStart')}>{made([this.start])}</Section>
+          <Section title={text('extract.sectionPyramid')}>{made([this.pyramid])}</Section>
+          <Section title={text('extract.sectionAttractors')}>{made([this.attractors])}</Section>
+          {this.page.paramsSection(true)}
+        </>
+      ),
+      results: (
+        <>
+          <Section title={text('labs.sectionSurface')}>
+            <WarningList warnings={this.page.warnings} />
+            <MeasureTable measures={this.measures} />
+          </Section>
+          <Section title={text('extract.sectionCoverage')}>{made([this.coverage])}</Section>
+          {this.run.saveSection(this.stage.subject, <ToSculpt isReady={this.#isReady} onSculpt={events.onSculpt} />)}
+          {this.run.finishSections(this.stage.editing, this.measures)}
+          <Section title={text('labs.sectionProgress')}>
+            {made([this.#plots])}
+            {this.run.plotData}
+          </Section>
+          <Section title={text('extract.sectionEvents')}>{made([this.#log])}</Section>
+          <Section title={text('extract.sectionTimes')}>{made([this.#times])}</Section>
+          <Folded title={text('extract.sectionCompare')} isOpen={this.#isComparing}>
+            {made([this.compare])}
+          </Folded>
+        </>
+      ),
     });
   }
 
@@ -160,7 +187,7 @@ export class ExtractParts {
     this.page.saving.name = volume.name;
     this.page.warnings.showData(source.warnings, volume.warnings);
     const shown = example?.unit ?? unit;
-    this.measures.unit = shown;
+    this.measures.unit.value = shown;
     this.stage.unit = shown;
     this.run.unit = shown;
     this.run.surfaceSpace = spaceOf(volume, shown);
@@ -174,7 +201,7 @@ export class ExtractParts {
     this.compare.clear();
     this.coverage.unit = this.stage.unit;
     this.coverage.clear();
-    if (isPreset(example) && example.compares) this.#compareHolder.open = true;
+    if (isPreset(example) && example.compares) this.#isComparing.value = true;
   }
 
   showFrame(source: ExtractSource): void {
@@ -184,8 +211,8 @@ export class ExtractParts {
   showParams(params: ParamValues, example: Example | undefined): void {
     this.page.showParams(params);
     if (typeof params.iso === 'number') this.histogram.setIso(params.iso);
-    if (isPreset(example)) this.#figure.show(example, variantInForce(example, params));
-    else this.#figure.show(undefined);
+    const preset = isPreset(example) ? example : undefined;
+    this.#figure.value = { preset, variant: preset && variantInForce(preset, params) };
   }
 
   refuseParam(name: string, message: string): void {
@@ -203,7 +230,7 @@ export class ExtractParts {
     this.run.showWarnings();
     this.#plots.update();
     this.#times.update(this.run.history);
-    this.run.csv.disabled = this.run.history.reports.length === 0;
+    this.run.hasPlots.value = this.run.history.reports.length > 0;
     this.#log.update(this.run.history);
   }
 
@@ -216,7 +243,7 @@ export class ExtractParts {
 
   showState(state: LabState, beneath: LabState, ready: boolean): void {
     const idle = this.run.showState(state, beneath, ready);
-    this.#sculpt.disabled = !idle;
+    this.#isReady.value = idle;
     this.compare.enabled = idle;
     this.coverage.enabled = idle;
   }
@@ -231,4 +258,14 @@ export class ExtractParts {
     this.page.root.toggleAttribute('data-placing', placing);
     this.page.status.say(placing ? text('extract.placeAttractors') : '');
   }
+}
+
+const made = (all: { element: HTMLElement }[]) => all.map(({ element }, index) => <Made key={index} of={element} />);
+
+function ToSculpt({ isReady, onSculpt }: { isReady: ReadonlySignal<boolean>; onSculpt: () => void }) {
+  return (
+    <Button class="wide" data-action="sculpt" disabled={!isReady.value} onClick={onSculpt}>
+      {text('labs.openInSculpt')}
+    </Button>
+  );
 }

@@ -1,24 +1,25 @@
+import type { ComponentChildren } from 'preact';
 import { count, milliseconds } from '../../kit/format';
-import { ExamplePanel, type Fact } from '../../lab/example-panel';
+import { type Fact, OpenData } from '../../lab/example-panel';
 import { plural, text } from '../../texts';
 import { SCENES, type SculptExample } from './examples';
 import { SCULPT_PRESETS } from './presets';
 
-/** Creates the panel that opens examples and, by `chooser`, files. */
+/** Returns the data that the lab opens: examples and, by `chooser`, files. */
 export function sceneData(
-  chooser: HTMLElement,
+  chooser: ComponentChildren,
   onExample: (example: SculptExample) => void,
-): ExamplePanel<SculptExample> {
+): OpenData<SculptExample> {
   const contents = {
     groups: [
       { label: text('sculpt.groupScenes'), examples: SCENES },
       { label: text('labs.groupFigures'), examples: SCULPT_PRESETS },
     ],
     facts: [text('labs.factFile'), text('sculpt.factDetail'), text('sculpt.factBands'), text('sculpt.factDuration')],
-    choosers: [chooser],
+    choosers: chooser,
     help: text('sculpt.dropHelp'),
   };
-  return new ExamplePanel<SculptExample>(contents, onExample);
+  return new OpenData<SculptExample>(contents, onExample);
 }
 
 /** Returns the facts about an open scene: meshes and ellipsoids. */

@@ -1,14 +1,15 @@
+import type { ComponentChildren } from 'preact';
 import { count } from '../../kit/format';
-import { ExamplePanel, type Fact } from '../../lab/example-panel';
+import { type Fact, OpenData } from '../../lab/example-panel';
 import { text } from '../../texts';
 import { CLOUDS, type CloudExample } from './examples';
 import { CLOUD_PRESETS } from './presets';
 
-/** Creates the panel that opens examples and, by `chooser`, files. */
+/** Returns the data that the lab opens: examples and, by `chooser`, files. */
 export function cloudData(
-  chooser: HTMLElement,
+  chooser: ComponentChildren,
   onExample: (example: CloudExample) => void,
-): ExamplePanel<CloudExample> {
+): OpenData<CloudExample> {
   const contents = {
     groups: [
       { label: text('reconstruct.points'), examples: CLOUDS },
@@ -20,10 +21,10 @@ export function cloudData(
       text('reconstruct.factColours'),
       text('reconstruct.factCameras'),
     ],
-    choosers: [chooser],
+    choosers: chooser,
     help: text('reconstruct.dropHelp'),
   };
-  return new ExamplePanel<CloudExample>(contents, onExample);
+  return new OpenData<CloudExample>(contents, onExample);
 }
 
 /** Returns the facts about open points. */

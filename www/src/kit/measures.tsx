@@ -1,6 +1,6 @@
+import { signal } from '@preact/signals';
 import type { Measures, StepReport, Unit } from '../engine/protocol';
 import { text } from '../texts';
-import { h } from './dom';
 import { count, figure, lengths } from './format';
 
 /**
@@ -56,55 +56,19 @@ export interface ExtraMeasure {
   optional?: boolean;
 }
 
-/** Table of the surface's measures: counts, topology, area, volume and validity. */
-export class MeasurePanel {
-  readonly element: HTMLElement;
-  readonly #cells = new Map<Name, HTMLElement>();
-  #unit: Unit = 'mm';
-  #values: Partial<MeasureValues> = {};
+/** The measures of a surface, as their table shows them. */
+export class SurfaceMeasures {
+  readonly unit = signal<Unit>('mm');
+  readonly values = signal<Partial<MeasureValues>>({});
   /** Measures of an edited surface, shown in place of the others. */
-  #edited: Partial<MeasureValues> | undefined;
-  readonly #extra: { measure: ExtraMeasure; cell: HTMLElement }[];
-  #extraValues: Record<string, unknown> = {};
-
-  /** `extra` is listed after the measures that every surface has. */
-  constructor(extra: ExtraMeasure[] = []) {
-    this.element = h('dl', { class: 'measures', 'data-measures': '{}' });
-    for (const row of ROWS) this.#cells.set(row.name, this.#addRow(row));
-    this.#extra = extra.map((measure) => ({ measure, cell: this.#addRow(measure) }));
-  }
-
-  #addRow({ name, label, help }: { name: string; label: string; help: string }): HTMLElement {
-    const cell = h('dd', { 'data-measure': name }, '–');
-    this.element.append(h('div', { title: help }, h('dt', {}, label), cell));
-    return cell;
-  }
-
-  /** Shows the lab's own measures; values without a row appear only in `data-measures`. */
-  showExtra(values: Record<string, unknown>): void {
-    this.#extraValues = values;
-    for (const { measure, cell } of this.#extra) {
-      const value = values[measure.name];
-      cell.textContent = typeof value === 'number' ? measure.text(value) : '–';
-      if (measure.optional && cell.parentElement) cell.parentElement.hidden = typeof value !== 'number';
-    }
-    this.#publish();
-  }
+  readonly edited = signal<Partial<MeasureValues> | undefined>(undefined);
+  /** Measures that only this lab has; those without a row appear only in `data-measures`. */
+  readonly extra = signal<Record<string, unknown>>({});
 
   /** Resets all measures to unknown, shown as dashes. */
   clear(): void {
-    this.#show({});
-    this.showExtra({});
-  }
-
-  #publish(): void {
-    this.element.dataset.measures = JSON.stringify({ ...(this.#edited ?? this.#values), ...this.#extraValues });
-  }
-
-  /** Unit of length, by which volume and area are formatted. */
-  set unit(unit: Unit) {
-    this.#unit = unit;
-    this.#show(this.#values);
+    this.values.value = {};
+    this.extra.value = {};
   }
 
   /**
@@ -112,40 +76,59 @@ export class MeasurePanel {
    * because they do not hold once the surface has moved.
    */
   showReport({ vertices, triangles, components, euler }: StepReport): void {
-    const { volume, area } = this.#values;
-    const known: Partial<MeasureValues> = {
-      vertices,
-      triangles,
-      components,
-      chi: euler,
-      genus: components - euler / 2,
-    };
-    if (volume !== undefined) known.volume = volume;
-    if (area !== undefined) known.area = area;
-    this.#show(known);
+    const { volume, area } = this.values.peek();
+    const genus = components - euler / 2;
+    const measured = { ...(volume !== undefined && { volume }), ...(area !== undefined && { area }) };
+    this.values.value = { vertices, triangles, components, chi: euler, genus, ...measured };
   }
 
   showMeasures(measures: Measures): void {
-    this.#show(valuesOf(measures));
+    this.values.value = valuesOf(measures);
   }
 
   /** Shows the measures of an edited surface in place of the others; undefined shows these again. */
   showEdited(measures: Measures | undefined): void {
-    this.#edited = measures && valuesOf(measures);
-    this.#show(this.#values);
+    this.edited.value = measures && valuesOf(measures);
   }
+}
 
-  #show(values: Partial<MeasureValues>): void {
-    this.#values = values;
-    this.#publish();
-    const shown = this.#edited ?? values;
-    for (const [name, cell] of this.#cells) {
-      const value = shown[name];
-      const text = value === undefined ? '–' : textOf(name, value, this.#unit);
-      if (cell.textContent !== text) cell.textContent = text;
-      cell.classList.toggle('bad', value === false || (name === 'crossings' && Number(value) > 0));
-    }
-  }
+interface TableProps {
+  measures: SurfaceMeasures;
+  /** Measures that are listed after those that every surface has. */
+  extra?: readonly ExtraMeasure[];
+}
+
+/** Table of the surface's measures: counts, topology, area, volume and validity. */
+export function MeasureTable({ measures, extra = [] }: TableProps) {
+  const shown = measures.edited.value ?? measures.values.value;
+  const own = measures.extra.value;
+  const unit = measures.unit.value;
+  return (
+    <dl class="measures" data-measures={JSON.stringify({ ...shown, ...own })}>
+      {ROWS.map(({ name, label, help }) => {
+        const value = shown[name];
+        const isBad = value === false || (name === 'crossings' && Number(value) > 0);
+        return (
+          <div key={name} title={help}>
+            <dt>{label}</dt>
+            <dd data-measure={name} class={isBad ? 'bad' : undefined}>
+              {value === undefined ? '–' : textOf(name, value, unit)}
+            </dd>
+          </div>
+        );
+      })}
+      {extra.map(({ name, label, help, text: shownAs, optional }) => {
+        const value = own[name];
+        const isKnown = typeof value === 'number';
+        return (
+          <div key={name} title={help} hidden={optional === true && !isKnown}>
+            <dt>{label}</dt>
+            <dd data-measure={name}>{isKnown ? shownAs(value) : '–'}</dd>
+          </div>
+        );
+      })}
+    </dl>
+  );
 }
 
 function valuesOf({ info, report }: Measures): Partial<MeasureValues> {

@@ -1,16 +1,17 @@
+import type { ComponentChildren } from 'preact';
 import type { VolumeView } from '../../engine/protocol';
 import { count, figure, lengths } from '../../kit/format';
-import { ExamplePanel, type Fact } from '../../lab/example-panel';
+import { type Fact, OpenData } from '../../lab/example-panel';
 import { text } from '../../texts';
 import { EXAMPLES, type Example } from './examples';
 import { PRESETS } from './presets';
 
-/** Creates the panel that opens examples and files; `chooser` opens files, and `more` are further controls. */
+/** Returns the data that the lab opens: examples and files; `chooser` opens files, and `more` are further controls. */
 export function extractData(
-  chooser: HTMLElement,
-  more: HTMLElement[],
+  chooser: ComponentChildren,
+  more: ComponentChildren,
   onExample: (example: Example) => void,
-): ExamplePanel<Example> {
+): OpenData<Example> {
   const contents = {
     groups: [
       { label: text('extract.groupVolumes'), examples: EXAMPLES },
@@ -22,11 +23,11 @@ export function extractData(
       text('labs.factVoxelSize'),
       text('extract.sectionIntensities'),
     ],
-    choosers: [chooser],
+    choosers: chooser,
     help: text('extract.dropHelp'),
     more,
   };
-  return new ExamplePanel<Example>(contents, onExample);
+  return new OpenData<Example>(contents, onExample);
 }
 
 /** Returns the facts about an open volume. */

@@ -1,5 +1,6 @@
+import type { ComponentChildren } from 'preact';
 import { count, lengths, milliseconds } from '../../kit/format';
-import { ExamplePanel, type Fact } from '../../lab/example-panel';
+import { type Fact, OpenData } from '../../lab/example-panel';
 import { unitOf } from '../../lab/surface-space';
 import { text } from '../../texts';
 import { SEGMENT_EXAMPLES, type SegmentExample } from './examples';
@@ -8,11 +9,11 @@ import type { OpenedImage } from './protocol';
 /** Name of the fact that tells where the label map is from. */
 export const MAP_FACT = text('segment.factMap');
 
-/** Creates the panel that opens examples and, by `choosers`, volumes and label maps. */
+/** Returns the data that the lab opens: examples and, by `choosers`, volumes and label maps. */
 export function segmentData(
-  choosers: HTMLElement[],
+  choosers: ComponentChildren,
   onExample: (example: SegmentExample) => void,
-): ExamplePanel<SegmentExample> {
+): OpenData<SegmentExample> {
   const contents = {
     groups: [{ label: text('extract.groupVolumes'), examples: SEGMENT_EXAMPLES }],
     facts: [
@@ -25,7 +26,7 @@ export function segmentData(
     choosers,
     help: text('segment.dropHelp'),
   };
-  return new ExamplePanel<SegmentExample>(contents, onExample);
+  return new OpenData<SegmentExample>(contents, onExample);
 }
 
 /** Returns the facts about an open volume and its label map. */
