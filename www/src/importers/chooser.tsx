@@ -13,10 +13,17 @@ interface ChooserProps {
   accept?: string | undefined;
   label?: string | undefined;
   admission?: Admission;
+  isDisabled?: boolean;
 }
 
 /** A button that chooses one file, or several that belong together. */
-export function FileChooser({ onFiles, accept = VOLUME_FILES, label, admission = 'volume' }: ChooserProps) {
+export function FileChooser({
+  onFiles,
+  accept = VOLUME_FILES,
+  label,
+  admission = 'volume',
+  isDisabled = false,
+}: ChooserProps) {
   const id = useId();
   const choose = (input: HTMLInputElement) => {
     const files = [...(input.files ?? [])];
@@ -27,7 +34,14 @@ export function FileChooser({ onFiles, accept = VOLUME_FILES, label, admission =
   return (
     <span class="chooser">
       <input
-        {...{ type: 'file', id, multiple: true, accept: `${accept},.zip`, class: 'visually-hidden' }}
+        {...{
+          type: 'file',
+          id,
+          multiple: true,
+          accept: `${accept},.zip`,
+          class: 'visually-hidden',
+          disabled: isDisabled,
+        }}
         onChange={({ currentTarget }) => choose(currentTarget)}
       />
       <label for={id} class="button">

@@ -10,7 +10,6 @@ import type { SurfaceMeasures } from '../kit/measures';
 import type { CodeEvents } from '../kit/session';
 import type { LabState } from '../kit/state';
 import { RunState, Transport, type TransportEvents } from '../kit/transport';
-import { Made } from '../kit/ui/mount';
 import { Button } from '../kit/ui/parts';
 import type { EditedView } from '../scene/edited-view';
 import type { PictureSubject } from '../scene/pictures';
@@ -144,7 +143,7 @@ export class RunControls {
       warnings: () => this.surfaceWarnings,
       save: (...file) => this.#page.saving.bytes(...file),
     });
-    return this.finish.elements.map((element, index) => <Made key={index} of={element} />);
+    return this.finish.sections;
   }
 
   /**

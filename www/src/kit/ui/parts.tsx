@@ -25,13 +25,18 @@ export function Section({ title, children }: { title: string; children: Componen
 interface FoldedProps {
   title: string;
   isOpen?: boolean | ReadonlySignal<boolean>;
+  onToggle?: (isOpen: boolean) => void;
   children: ComponentChildren;
 }
 
 /** A section of a column that is collapsed until the user opens it. */
-export function Folded({ title, isOpen = false, children }: FoldedProps) {
+export function Folded({ title, isOpen = false, onToggle, children }: FoldedProps) {
   return (
-    <details class="panel" open={typeof isOpen === 'boolean' ? isOpen : isOpen.value}>
+    <details
+      class="panel"
+      open={typeof isOpen === 'boolean' ? isOpen : isOpen.value}
+      onToggle={({ currentTarget }) => onToggle?.(currentTarget.open)}
+    >
       <summary>
         <h2>{title}</h2>
       </summary>

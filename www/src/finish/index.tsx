@@ -1,13 +1,17 @@
 /** Editing and comparison of a surface after a run, the same in all labs. */
 
+import { signal } from '@preact/signals';
+import type { ComponentChildren } from 'preact';
 import type { Edit, ExportRequest, Measures, Unit, Vec3 } from '../engine/protocol';
 import type { Warning } from '../engine/warnings';
-import { folded } from '../kit/dom';
 import type { SurfaceMeasures } from '../kit/measures';
+import { Folded } from '../kit/ui/parts';
 import type { EditedView } from '../scene/edited-view';
 import { text } from '../texts';
-import { ReferencePanel } from './compare-panel';
+import { ComparePanel } from './compare-panel';
+import { Comparing } from './comparing';
 import { EditPanel } from './edit-panel';
+import { Editing } from './editing';
 import { Finishing, isCancelled } from './finishing';
 import type { Edited } from './protocol';
 import { MOST_OF_SMALL } from './size';
@@ -23,27 +27,27 @@ export interface FinishHost {
   save: (extension: string, bytes: Uint8Array, type: string, suffix: string) => void;
 }
 
-/** Panels that edit the surface of a lab and compare it with a reference. */
+/** Edits of the surface of a lab, and its comparison with a reference. */
 export class Finish {
-  readonly elements: HTMLElement[];
   /** Called after each edit or undo, with the measures of the edited surface; undefined if no edits are left. */
   onEdited: (measures: Measures | undefined) => void = () => undefined;
   readonly #host: FinishHost;
   readonly #finishing: Finishing;
-  readonly #edits: EditPanel;
-  readonly #section: HTMLDetailsElement;
-  readonly #reference: ReferencePanel;
+  readonly #editing: Editing;
+  readonly #comparing: Comparing;
+  /** Whether the controls of edits are unfolded. */
+  readonly #isUnfolded = signal(false);
   #values: Float32Array | undefined;
 
   constructor(host: FinishHost) {
     this.#host = host;
     this.#finishing = new Finishing(host.mesh, {
       onChange: (edited) => this.#adopt(edited),
-      onLost: () => this.#reference.forget(),
-      onCancelled: () => this.#reference.reopen(),
+      onLost: () => this.#comparing.forget(),
+      onCancelled: () => this.#comparing.reopen(),
     });
-    this.#edits = new EditPanel(this.#finishing, host.view);
-    this.#reference = new ReferencePanel(this.#finishing, {
+    this.#editing = new Editing(this.#finishing, host.view);
+    this.#comparing = new Comparing(this.#finishing, {
       onValues: (values) => {
         this.#values = values;
         this.#show();
@@ -51,24 +55,37 @@ export class Finish {
       onSave: host.save,
       warnings: host.warnings,
     });
-    this.#section = folded(text('finish.title'), this.#edits.element);
-    this.#section.addEventListener('toggle', () => {
-      this.#edits.unfolded = this.#section.open;
-    });
-    this.elements = [this.#section, folded(text('finish.compareTitle'), this.#reference.element)];
+  }
+
+  /** The sections of the controls. */
+  get sections(): ComponentChildren {
+    const onToggle = (isOpen: boolean) => {
+      this.#isUnfolded.value = isOpen;
+      this.#editing.unfolded = isOpen;
+    };
+    return (
+      <>
+        <Folded title={text('finish.title')} isOpen={this.#isUnfolded} onToggle={onToggle}>
+          <EditPanel editing={this.#editing} />
+        </Folded>
+        <Folded title={text('finish.compareTitle')}>
+          <ComparePanel comparing={this.#comparing} />
+        </Folded>
+      </>
+    );
   }
 
   /** Unit of length of the surface, or empty. */
   set unit(unit: Unit) {
-    this.#edits.unit = unit;
-    this.#reference.unit = unit;
+    this.#editing.unit.value = unit;
+    this.#comparing.unit.value = unit;
     this.#host.view.unit = unit;
   }
 
   /** Whether the lab has a surface that does not change by itself. */
   set enabled(enabled: boolean) {
-    this.#edits.enabled = enabled;
-    this.#reference.enabled = enabled;
+    this.#editing.enabled = enabled;
+    this.#comparing.isEnabled.value = enabled;
   }
 
   /** Returns the edited surface as a file; undefined if there are no edits. */
@@ -100,7 +117,7 @@ export class Finish {
     const all = [...edits, ...undone];
     if (all.length === 0) return;
     // Shown, with *Cancel*: edits may take long.
-    this.#section.open = true;
+    this.#isUnfolded.value = true;
     let done = 0;
     const make = async () => {
       for (const edit of all) {
@@ -111,7 +128,7 @@ export class Finish {
     };
     const made = make();
     const state = () => text('finish.repeated', { made: done, count: all.length });
-    if (await this.#edits.attempt(() => made, { state })) return;
+    if (await this.#editing.attempt(() => made, { state })) return;
     await made.catch((error) => {
       if (!isCancelled(error)) throw error;
     });
@@ -127,13 +144,13 @@ export class Finish {
   }
 
   #adopt(edited: Edited | undefined): void {
-    this.#edits.show(edited);
-    this.#reference.clear();
+    this.#editing.take(edited);
+    this.#comparing.clear();
     this.#show();
     if (!edited) return;
     const { log, undone, measures } = edited;
     if (log.length + undone.length > 0) this.onEdited(log.length > 0 ? measures : undefined);
-    void this.#reference.compare();
+    void this.#comparing.compare();
   }
 
   /** Shows the edited surface, or the lab's own as long as there are neither edits nor colours. */
