@@ -8,10 +8,9 @@ import { ParamControls, Params } from '../kit/params';
 import { type CodeEvents, SessionControls, type SessionEvents } from '../kit/session';
 import type { LabState } from '../kit/state';
 import { Banner, ErrorBanner, Status, StatusLine } from '../kit/status';
-import { Made } from '../kit/ui/mount';
 import { Button, Folded, Section } from '../kit/ui/parts';
 import { Warnings } from '../kit/warnings';
-import { PicturePanel, type PictureSubject } from '../scene/pictures';
+import { PicturePanel, type PictureSubject, Pictures } from '../scene/pictures';
 import { text } from '../texts';
 import type { Listed, OpenData } from './example-panel';
 import { Saving } from './saving';
@@ -85,7 +84,7 @@ export class LabPage<Example extends Listed> {
   readonly #isOver = signal(false);
   readonly #events: LabEvents<Example>;
   readonly #options: PageOptions<Example>;
-  #pictures: PicturePanel | undefined;
+  #pictures: Pictures | undefined;
   readonly #signal: AbortSignal;
 
   /** Files dropped on the page are accepted until `closed` is aborted. */
@@ -180,7 +179,7 @@ export class LabPage<Example extends Listed> {
    * the run, if the model runs.
    */
   saveSection(subject: PictureSubject, views?: ComponentChildren, onRun?: () => void): ComponentChildren {
-    const pictures = new PicturePanel(subject, {
+    const pictures = new Pictures(subject, {
       unit: () => this.unit,
       save: (...file) => this.saving.bytes(...file),
       onRun,
@@ -192,7 +191,7 @@ export class LabPage<Example extends Listed> {
       <Section title={text('labs.sectionSave')}>
         {views}
         <SessionControls {...{ events: this.#events, code: this.code, help, isEnabled: this.canSave }} />
-        <Made of={pictures.element} />
+        <PicturePanel pictures={pictures} />
         <Button class="wide" data-action="link" onClick={this.#events.onCopyLink}>
           {text('labs.copyLink')}
         </Button>
