@@ -3,6 +3,7 @@ import { fileURLToPath } from 'node:url';
 import { defineConfig, type Plugin, type Rolldown } from 'vite';
 import { noteBundled } from '../scripts/licences.mjs';
 import { APP_POLICY, EXTRACT_WORKER } from '../scripts/policy.mjs';
+import { fewTexts } from './texts-of-workers';
 
 /** A live page for each host that there is an adapter for. */
 const EMBEDS = [
@@ -184,7 +185,7 @@ export default defineConfig({
   plugins: [underPolicy(), sameVtk(), withoutClipper(), newestFonts(), decodersBeside(), listFiles(), noted.page],
   worker: {
     format: 'es',
-    plugins: () => [ownMethod(), noted.worker],
+    plugins: () => [ownMethod(), fewTexts(), noted.worker],
     rolldownOptions: { output: { entryFileNames: nameWorker } },
   },
   server: { host: '127.0.0.1' },
