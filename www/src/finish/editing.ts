@@ -32,7 +32,7 @@ export class Form {
   }
 }
 
-/** What clicks on the surface do: they choose components, or measure distances. */
+/** Use of clicks on the surface: they choose components, or measure distances. */
 export type Picking = 'choose' | 'measure';
 
 /** The edits of a surface after a run, and distances on it. */
