@@ -157,7 +157,7 @@ const WRONG: Case[] = [
 ];
 
 describe('an answer', () => {
-  const begin = (key: TextKey) => text(key, { unit: '…', value: '…' }).split('…')[0] ?? '';
+  const begin = (key: TextKey) => text(key, { unit: '…', value: '…' } as never).split('…')[0] ?? '';
 
   test.each(RIGHT)('%j is right for %j', (typed, expected, key) => {
     const { isRight, says } = judge(typed, expected);

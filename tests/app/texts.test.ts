@@ -3,6 +3,7 @@ import { readdirSync, readFileSync } from 'node:fs';
 import { fileURLToPath } from 'node:url';
 import ts from 'typescript';
 import { expect, test } from 'vitest';
+import { typesOf } from '../../scripts/texts.mjs';
 import { legible, plural, type TextKey, text, textNodes } from '../../www/src/texts';
 import german from '../../www/src/texts/de.json';
 import catalogue from '../../www/src/texts/en.json';
@@ -81,6 +82,11 @@ test('every use of a text gives the values of its placeholders, and no others', 
   expect(wrong).toEqual([]);
 });
 
+test('the types of the placeholders are those of the catalogue', () => {
+  const types = readFileSync(`${ROOT}texts/placeholders.ts`, 'utf8');
+  expect(types, 'npm run texts writes them').toBe(typesOf(catalogue));
+});
+
 test('all plural forms of a text have the same placeholders, besides the number', () => {
   for (const [key, value] of texts) {
     const other = texts.get(key.replace(FORMS, '_other'));
@@ -94,7 +100,7 @@ test('all plural forms of a text have the same placeholders, besides the number'
 test('placeholders are replaced, a missing value is an error, and numbers choose the plural form', () => {
   const key: TextKey = 'labs.opening';
   expect(text(key, { name: 'a.nii' })).toBe('Opening a.nii.');
-  expect(() => text(key)).toThrow('{name}');
+  expect(() => text(key, {} as never)).toThrow('{name}');
   expect(textNodes(key, { name: 'a.nii' })).toEqual(['Opening ', 'a.nii', '.']);
   expect([plural('counts.step', 1), plural('counts.step', 1200)]).toEqual(['1 step', '1,200 steps']);
 });

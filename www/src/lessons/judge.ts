@@ -1,7 +1,7 @@
 /** Judges answers to questions about a number, as a teacher would: by their value, and with what is wrong about them. */
 
 import { figure } from '../kit/format';
-import { type TextKey, text } from '../texts';
+import { text } from '../texts';
 import { quantityFrom } from './numerals';
 import { PLAIN, unitIn, unitNamed } from './units';
 
@@ -19,7 +19,7 @@ export interface Verdict {
   says: string;
 }
 
-const wrong = (key: TextKey, values = {}): Verdict => ({ isRight: false, says: text(key, values) });
+const wrong = (says: string): Verdict => ({ isRight: false, says });
 
 /** Words that make one number of several, or another of it. */
 const UNCLEAR = /^(or|and|to|not|per|each|times|minus|plus|oder|und|bis|nicht|pro|je|mal)$/i;
@@ -31,17 +31,17 @@ const isClear = (word: string) => WORD.test(word) && !UNCLEAR.test(word);
 /** Judges an answer that is not empty. */
 export function judge(typed: string, expected: Expected): Verdict {
   const quantity = quantityFrom(typed);
-  if (!quantity) return wrong('lessons.notUnderstood');
+  if (!quantity) return wrong(text('lessons.notUnderstood'));
   const { values, words } = quantity;
   const { unit: given, others } = unitIn(words);
-  if (!others.every(isClear)) return wrong('lessons.notUnderstood');
+  if (!others.every(isClear)) return wrong(text('lessons.notUnderstood'));
   const { value, unit } = expected;
-  if (value === undefined) return wrong('lessons.notMeasured');
+  if (value === undefined) return wrong(text('lessons.notMeasured'));
   const asked = (unit !== undefined && unitNamed(unit)) || PLAIN;
   const fits = given ? given.kind === asked.kind : unit === undefined || others.length === 0;
   // Nothing is nothing in any unit.
   const isNothing = value === 0 && values.includes(0);
-  if (!fits && !isNothing) return unit ? wrong('lessons.unitWrong', { unit }) : wrong('lessons.noUnit');
+  if (!fits && !isNothing) return unit ? wrong(text('lessons.unitWrong', { unit })) : wrong(text('lessons.noUnit'));
   const verdict = compared(values, fits && given ? given.factor / asked.factor : 1, { ...expected, value });
   // A number typed as it is shown here needs no note.
   return verdict.says === rightAs(typed.trim()) ? { isRight: true, says: text('lessons.right') } : verdict;
@@ -67,9 +67,9 @@ const isNear = (found: number, expected: number, within: number) =>
 const POWERS = [1, 3, 4, 5, 6, 9].flatMap((power) => [10 ** power, 10 ** -power]);
 
 /** Returns what to say about an answer that is not right. */
-function mistake(values: number[], expected: number, within: number): TextKey {
+function mistake(values: number[], expected: number, within: number): string {
   const isOff = (factor: number) => expected !== 0 && values.some((one) => isNear(one * factor, expected, within));
-  if (isOff(-1)) return 'lessons.signWrong';
-  if (isOff(100) || isOff(0.01)) return 'lessons.percentWrong';
-  return POWERS.some(isOff) ? 'lessons.factorWrong' : 'lessons.wrong';
+  if (isOff(-1)) return text('lessons.signWrong');
+  if (isOff(100) || isOff(0.01)) return text('lessons.percentWrong');
+  return text(POWERS.some(isOff) ? 'lessons.factorWrong' : 'lessons.wrong');
 }

@@ -1,5 +1,6 @@
 import catalogue from './en.json';
 import { chosenLanguage } from './language';
+import type { Placeholders } from './placeholders';
 
 /**
  * Language of the interface, for texts, plural and number formats. All texts are in `en.json`, by the part of the app; a
@@ -13,6 +14,17 @@ type KeyIn<S extends keyof Catalogue> = `${S}.${keyof Catalogue[S] & string}`;
 export type TextKey = { [S in keyof Catalogue]: KeyIn<S> }[keyof Catalogue];
 /** Key of a text with plural forms, without the suffix of the form, such as `_one`. */
 export type PluralKey = TextKey extends infer K ? (K extends `${infer Base}_other` ? Base : never) : never;
+/** Values for the placeholders of a text, if it has any. */
+type ValuesOf<Key> = Key extends keyof Placeholders
+  ? [values: Readonly<Record<Placeholders[Key], string | number>>]
+  : [values?: undefined];
+/** The same for a text with plural forms, which may show the number in another way. */
+type ValuesOfPlural<Key extends PluralKey> =
+  OthersOf<`${Key}_other`> extends never
+    ? [values?: { count?: string }]
+    : [values: Readonly<Record<OthersOf<`${Key}_other`>, string | number>> & { count?: string }];
+/** The placeholders of a text besides the number. */
+type OthersOf<Key> = Key extends keyof Placeholders ? Exclude<Placeholders[Key], 'count'> : never;
 /** Values for the placeholders of a text of the interface, by name. */
 export type TextValues = Record<string, string | number>;
 
@@ -33,7 +45,11 @@ export function count(value: number): string {
  *
  * Throws an Error if the value of a placeholder is missing.
  */
-export function text(key: TextKey, values: TextValues = {}): string {
+export function text<Key extends TextKey>(key: Key, ...[values]: ValuesOf<Key>): string {
+  return filled(key, values ?? {});
+}
+
+function filled(key: string, values: TextValues): string {
   return template(key).replace(/\{(\w+)\}/g, (_, name: string) => clipped(String(requiredValue(values, name, key))));
 }
 
@@ -59,10 +75,10 @@ export const legible = (foreign: string): string => foreign.replace(SURPLUS_MARK
  * Returns the plural form of a text that the language uses for this number, as "1 frame" or "2 frames"; the placeholder
  * `{count}` is the number. The forms have the suffixes `_one`, `_other` and so on.
  */
-export function plural(key: PluralKey, number: number, values: TextValues = {}): string {
+export function plural<Key extends PluralKey>(key: Key, number: number, ...[values]: ValuesOfPlural<Key>): string {
   const form = `${key}_${FORMS.select(number)}`;
   const known = (find(form) === undefined ? `${key}_other` : form) as TextKey;
-  return text(known, { count: count(number), ...values });
+  return filled(known, { count: count(number), ...values });
 }
 
 /**
