@@ -82,11 +82,11 @@ export function plural<Key extends PluralKey>(key: Key, number: number, ...[valu
 }
 
 /**
- * Returns a text of the interface whose placeholders may be elements, as a list of children for an element.
+ * Returns a text of the interface whose placeholders may be elements, as a list of its parts.
  *
  * Throws an Error if the value of a placeholder is missing.
  */
-export function textNodes(key: TextKey, values: Record<string, Node | string>): (Node | string)[] {
+export function textNodes<Part>(key: TextKey, values: Record<string, Part | string>): (Part | string)[] {
   return template(key)
     .split(/(\{\w+\})/)
     .filter((part) => part !== '')
