@@ -128,7 +128,14 @@ export function Select<Value extends string>(given: SelectProps<Value>) {
   return (
     <select {...props} value={value} onChange={({ currentTarget }) => onChoose(currentTarget.value as Value)}>
       {entries.map(([one, label]) => (
-        <option key={one} value={one} hidden={hidden.includes(one)} disabled={disabledChoices.includes(one)}>
+        <option
+          key={one}
+          value={one}
+          hidden={hidden.includes(one)}
+          disabled={disabledChoices.includes(one)}
+          // Else it would lack the attribute where its label is the same.
+          ref={(option) => option?.setAttribute('value', one)}
+        >
           {label}
         </option>
       ))}

@@ -27,7 +27,7 @@ export class Filming {
   addKey(): void {
     const { film, pose } = this.#settings;
     const known =
-      film && 'keys' in film ? film : { keys: [], between: this.#ui.film.between, loop: film?.loop ?? false };
+      film && 'keys' in film ? film : { keys: [], between: this.#ui.film.between.peek(), loop: film?.loop ?? false };
     const keys = [...known.keys, pose];
     this.#change({ ...known, keys }, text('sculpt.newKeyframeChange'), known.between * (keys.length - 1));
     this.#ui.page.status.say(text('sculpt.keyframeAdded', { number: keys.length }));
@@ -64,7 +64,7 @@ export class Filming {
   /** Records the whole film as a GLB file with an animated surface, and saves the file. */
   async record(): Promise<void> {
     if (!this.#states.canChange) return;
-    this.#ui.film.showRecording(0);
+    this.#ui.film.recording.value = 0;
     this.#ui.page.status.say(text('sculpt.recording'));
     try {
       const bytes = await this.#client.request('record', { frameSeconds: FRAME_SECONDS });
@@ -73,7 +73,7 @@ export class Filming {
     } catch (error) {
       this.#states.fail(text('sculpt.recordingFailed'), error);
     }
-    this.#ui.film.showRecording(undefined);
+    this.#ui.film.recording.value = undefined;
   }
 
   #change(film: Film | undefined, what: string, frame: number): void {

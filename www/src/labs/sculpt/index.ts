@@ -266,7 +266,7 @@ class SculptLab implements RunningLab<SculptExample> {
 
   #onEvent(event: WorkerEvent): void {
     if (this.#runs.takes(event)) return;
-    if (event.event === 'recorded') this.ui.film.showRecording(event.progress);
+    if (event.event === 'recorded') this.ui.film.recording.value = event.progress;
     else if (event.event === 'frame') this.#results.take(event);
     else if (event.event === 'measured') this.#results.measured(event);
     else this.#settings.reject(event.pose, event.failure.message);

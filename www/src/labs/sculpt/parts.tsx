@@ -1,8 +1,7 @@
-import { signal } from '@preact/signals';
+import { type ReadonlySignal, signal } from '@preact/signals';
 import type { Texture } from 'three';
 import type { Warning } from '../../engine/warnings';
 import { FileChooser } from '../../importers/chooser';
-import { h } from '../../kit/dom';
 import type { History } from '../../kit/history';
 import { MeasureTable, SurfaceMeasures } from '../../kit/measures';
 import { Plots } from '../../kit/plots';
@@ -24,8 +23,8 @@ import type { SculptExample } from './examples';
 import { SCULPT_PLOTS, SCULPT_ROWS } from './measures';
 import { ACCEPT } from './mesh-files';
 import { factsOf, sceneData } from './page';
-import { EllipsoidControls, type EllipsoidEvents } from './panels/ellipsoids';
-import { FilmControls, type FilmEvents } from './panels/film';
+import { EllipsoidControls, type EllipsoidEvents, Ellipsoids } from './panels/ellipsoids';
+import { FilmControls, type FilmEvents, FilmState } from './panels/film';
 import { offerLayouts, offerTexture } from './panels/options';
 import { SupportControl } from './panels/support';
 import { pictureOf } from './picture';
@@ -52,17 +51,21 @@ export class SculptParts {
   readonly carrier: SurfaceCarrier;
   readonly latency = new DragLatency();
   readonly measures = new SurfaceMeasures();
-  readonly previewNote = h('p', { class: 'coarse', hidden: true }, text('sculpt.coarsePreview'));
+  /** Whether the surface that is drawn is a coarse preview. */
+  readonly isPreview = signal(false);
   readonly options: ViewOptions<typeof SCULPT_VIEW>;
-  readonly ellipsoids: EllipsoidControls;
-  readonly film: FilmControls;
-  readonly support: SupportControl;
+  readonly ellipsoids = new Ellipsoids();
+  readonly film = new FilmState();
+  readonly #support = signal<Support>('membrane');
+  /** Whether there is a choice of what supports the surface. */
+  readonly #hasChoice = signal(false);
   readonly plots: Plots;
   readonly #onError: PartEvents['onError'];
   readonly #figure = signal<{ preset: SculptPreset | undefined; variant: SculptVariant | undefined }>({
     ...{ preset: undefined, variant: undefined },
   });
-  readonly #captions = h('div', { class: 'captions', hidden: true });
+  /** Captions of the surfaces side by side. */
+  readonly #captions = signal<readonly string[]>([]);
   /** Counts textures, so that one that is still being decoded does not replace a newer one. */
   #pictures = 0;
   #texture: Texture | undefined;
@@ -82,20 +85,24 @@ export class SculptParts {
     this.view = new SculptureView(this.page.canvas, initialOptions(SCULPT_VIEW));
     this.carrier = new SurfaceCarrier(this.view);
     this.#onError = events.onError;
-    this.ellipsoids = new EllipsoidControls(events);
-    this.film = new FilmControls(events);
-    this.support = new SupportControl(events.onSupport);
     this.plots = new Plots(history, SCULPT_PLOTS, true);
     this.options = new ViewOptions(SCULPT_VIEW, (options) => {
       this.view.setOptions(options);
       events.onOptions(options);
     });
-    this.view.onCaptions = (captions) => this.#showCaptions(captions);
+    this.view.onCaptions = (captions) => {
+      this.#captions.value = captions;
+    };
     this.page.layOut({
       name: 'sculpt',
       options: <OptionControls of={this.options} />,
-      over: [this.view.legend.element, this.view.editing.legend.element, this.previewNote, this.#captions].map(
-        (element, index) => <Made key={index} of={element} />,
+      over: (
+        <>
+          <Made of={this.view.legend.element} />
+          <Made of={this.view.editing.legend.element} />
+          <PreviewNote isShown={this.isPreview} />
+          <Captions captions={this.#captions} />
+        </>
       ),
       stage: (view, status) => (
         <>
@@ -108,14 +115,14 @@ export class SculptParts {
         <>
           <Section title={text('sculpt.sectionScene')}>
             <DataPanel data={this.page.data} />
-            <Made of={this.support.element} />
+            <SupportControl support={this.#support} hasChoice={this.#hasChoice} onSupport={events.onSupport} />
             <FigureOf shown={this.#figure} onVariant={events.onVariant} />
           </Section>
           <Section title={text('sculpt.sectionEllipsoids')}>
-            <Made of={this.ellipsoids.element} />
+            <EllipsoidControls state={this.ellipsoids} events={events} />
           </Section>
           <Section title={text('sculpt.sectionFilm')}>
-            <Made of={this.film.element} />
+            <FilmControls state={this.film} events={events} />
           </Section>
           {this.page.paramsSection()}
         </>
@@ -147,7 +154,7 @@ export class SculptParts {
     this.page.saving.name = example?.id ?? name;
     this.page.warnings.showData(known, warnings);
     this.measures.unit.value = '';
-    this.support.hasChoice = hasChoice;
+    this.#hasChoice.value = hasChoice;
     this.view.setScene(box, example?.up ?? 'y', start, [pose, ...posesOf(example)]);
     this.#showTexture(texture);
     this.page.data.show(factsOf({ name, detail, bands, buildMs }), example);
@@ -173,7 +180,7 @@ export class SculptParts {
   }
 
   showSupport(support: Support): void {
-    this.support.show(support);
+    this.#support.value = support;
     offerLayouts(this.options, support === 'membrane');
     this.page.hideParams(Object.fromEntries(OF_MEMBRANES.map((name) => [name, support === 'surface'])));
   }
@@ -198,9 +205,24 @@ export class SculptParts {
     this.#texture?.dispose();
     this.view.dispose();
   }
+}
 
-  #showCaptions(captions: string[]): void {
-    this.#captions.hidden = captions.length === 0;
-    this.#captions.replaceChildren(...captions.map((caption) => h('span', {}, caption)));
-  }
+/** Says that a preview is coarser than the surface. */
+function PreviewNote({ isShown }: { isShown: ReadonlySignal<boolean> }) {
+  return (
+    <p class="coarse" hidden={!isShown.value}>
+      {text('sculpt.coarsePreview')}
+    </p>
+  );
+}
+
+/** Captions of the surfaces side by side, if there are several. */
+function Captions({ captions }: { captions: ReadonlySignal<readonly string[]> }) {
+  return (
+    <div class="captions" hidden={captions.value.length === 0}>
+      {captions.value.map((caption) => (
+        <span key={caption}>{caption}</span>
+      ))}
+    </div>
+  );
 }

@@ -54,7 +54,7 @@ export class Posing {
 
   set mode(mode: HandleMode) {
     this.#mode = mode;
-    this.#ui.ellipsoids.mode = mode;
+    this.#ui.ellipsoids.mode.value = mode;
     this.#ui.view.mode = mode;
     this.#ui.page.status.say(text(MODE_TEXTS[mode]));
   }

@@ -141,13 +141,13 @@ export class SculptResults {
   }
 
   #show(frame: FrameEvent): void {
-    const { view, carrier, measures, previewNote } = this.#ui;
+    const { view, carrier, measures, isPreview } = this.#ui;
     view.show('S1dash', frame.result);
     view.show('S0dash', frame.base);
     carrier.frameShown(frame);
     view.show('T', frame.link);
     if (frame.levels) view.showStages(frame.levels);
-    previewNote.hidden = !frame.preview;
+    isPreview.value = frame.preview;
     this.#follow(frame);
     this.#showLatency(frame.poseId);
     this.#more.frameMs = frame.durationMs;

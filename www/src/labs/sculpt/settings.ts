@@ -222,7 +222,7 @@ export class SculptSettings {
     this.#pose = pose;
     this.#names = named(this.#names, pose.length);
     this.#showPose();
-    this.#ui.ellipsoids.showError(why);
+    this.#ui.ellipsoids.error.value = why;
   }
 
   /**
