@@ -18,7 +18,7 @@ export class OpenLesson {
   readonly visits = signal(0);
   /** Whether the browser keeps the progress. */
   readonly isKept = signal(true);
-  /** What is announced to screen readers. */
+  /** Announcement to screen readers. */
   readonly news = signal('');
   readonly saved = signal(text('lessons.saveHelp'));
   /** The step to whose question an empty answer was given. */

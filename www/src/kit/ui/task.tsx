@@ -43,10 +43,11 @@ export function Task(props: TaskProps) {
   const { isRunning, message } = task;
   const [starter, canceller] = [useRef<HTMLButtonElement>(null), useRef<HTMLButtonElement>(null)];
   const wasRunning = useRef(false);
+  // Read before the button is hidden: hiding takes the focus from it.
+  const hadFocus = canceller.current !== null && document.activeElement === canceller.current;
   useLayoutEffect(() => {
     if (isRunning && !wasRunning.current) canceller.current?.focus();
-    // The button is hidden, but still has the focus.
-    if (!isRunning && document.activeElement === canceller.current) starter.current?.focus();
+    if (!isRunning && hadFocus) starter.current?.focus();
     wasRunning.current = isRunning;
   }, [isRunning]);
   const data = (value: string) => ({ [`data-${name}`]: value });
