@@ -397,7 +397,7 @@ describe('files', () => {
       await afterRun(app.page, () => setParam('lambdaSurface', '0.003'));
       await afterRun(app.page, () => drop(app.page, [{ name: 'again.xyz', bytes: asText('two balls') }]));
       expect(await app.page.evaluate(() => location.hash)).toBe(
-        '#reconstruct?file=again.xyz&p.lambdaSurface=0.003&v=2',
+        '#reconstruct?file=again.xyz&v=2&p.lambdaSurface=0.003',
       );
     },
   );
@@ -408,7 +408,7 @@ describe('files', () => {
     await afterRun(app.page, () => drop(app.page, [{ name: 'balls.xyz', bytes: asText('two balls') }]));
     // It is from before parameters were chosen from the points, and relies on the values of then.
     expect(await app.page.evaluate(() => location.hash)).toBe(
-      '#reconstruct?file=balls.xyz&p.delta=9&p.lambdaSurface=0.001&p.lambdaExterior=2&p.sides=outside&v=2',
+      '#reconstruct?file=balls.xyz&v=2&p.delta=9&p.lambdaSurface=0.001&p.lambdaExterior=2&p.sides=outside',
     );
     expect(await measured()).toMatchObject({ components: 2, delta: 9, interiorConstraints: 0 });
   });

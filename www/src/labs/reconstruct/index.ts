@@ -47,7 +47,7 @@ class ReconstructLab implements RunningLab<CloudExample> {
     act: () => {
       const { page, tools, photos } = this.ui;
       if (page.banner.shown) this.shell.dismiss();
-      else if (tools.tool !== 'none') tools.deselect();
+      else if (tools.tool.peek() !== 'none') tools.choose('none');
       else photos.choose(undefined);
     },
   };
@@ -156,7 +156,7 @@ class ReconstructLab implements RunningLab<CloudExample> {
     const { choice, params, edits } = this.#settings;
     const { defaults } = this.#data;
     const { value: view } = this.ui.options;
-    const photo = this.ui.photos.chosen;
+    const photo = this.ui.photos.chosen.peek();
     const { size } = this.ui.view;
     return toHash(linkOf({ example, file, choice, params, defaults, edits, size, view, photo }));
   }

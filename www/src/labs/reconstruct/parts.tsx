@@ -1,8 +1,8 @@
 import { type ReadonlySignal, signal } from '@preact/signals';
+import type { ComponentChildren } from 'preact';
 import type { ImplicitChoice } from 'vesicle';
 import { FileChooser } from '../../importers/chooser';
-import { h } from '../../kit/dom';
-import type { History } from '../../kit/history';
+import { History } from '../../kit/history';
 import { MeasureTable, SurfaceMeasures } from '../../kit/measures';
 import { Plots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
@@ -21,12 +21,12 @@ import type { CloudExample } from './examples';
 import { FIT_ROWS, RESIDUAL_PLOT } from './measures';
 import { cloudData, factsOf } from './page';
 import { CloudOptions, cloudOptions, offerCameras } from './panels/cloud-options';
-import { type CloudChoice, CloudSetup } from './panels/cloud-setup';
-import { EditTools } from './panels/edit-tools';
-import { KernelPlot } from './panels/kernel-plot';
-import { PhaseList } from './panels/phases';
-import { PhotoStrip } from './panels/photo-strip';
-import { TimingPanel } from './panels/timing';
+import { type CloudChoice, CloudSetup, CloudSetupFields } from './panels/cloud-setup';
+import { EditControls, EditTools } from './panels/edit-tools';
+import { KernelCurve } from './panels/kernel-plot';
+import { PhaseList, phasesOf } from './panels/phases';
+import { LargePhotograph, Photographs, PhotoStrip } from './panels/photo-strip';
+import { TimingPanel, Timings } from './panels/timing';
 import type { Photograph } from './photographs';
 import { ACCEPT } from './point-files';
 import type { CloudPreset, CloudVariant } from './presets';
@@ -52,20 +52,21 @@ export class ReconstructParts {
   readonly run: RunControls;
 
   readonly view: ReconstructionView;
-  readonly phases = new PhaseList();
   readonly measures = new SurfaceMeasures();
-  readonly warning = h('p', { class: 'warning', role: 'status', 'data-warning': '' });
-  readonly setup: CloudSetup;
+  /** What is uncertain about the fit. */
+  readonly warning = signal('');
+  readonly setup = new CloudSetup();
   readonly options: ViewOptions<typeof CLOUD_VIEW>;
-  readonly photos: PhotoStrip;
-  readonly tools: EditTools;
+  readonly photos = new Photographs((index) => this.#lookThrough(index));
+  readonly tools = new EditTools((tool) => this.#setTool(tool !== 'none'));
   readonly plots: Plots;
-  readonly timing: TimingPanel;
+  readonly timing: Timings;
   readonly #events: PartEvents;
   readonly #figure = signal<{ preset: CloudPreset | undefined; variant: CloudVariant | undefined }>({
     ...{ preset: undefined, variant: undefined },
   });
-  readonly #kernel = new KernelPlot();
+  readonly #kernel = new KernelCurve();
+  readonly #phases = signal(phasesOf(new History(), false));
   /** Whether there is a complete surface. */
   readonly #hasSurface = signal(false);
   #photographs: readonly Photograph[] = [];
@@ -86,28 +87,30 @@ export class ReconstructParts {
     });
     this.view = new ReconstructionView(this.page.canvas, initialOptions(CLOUD_VIEW));
     this.#events = events;
-    this.setup = new CloudSetup(events.onChoice);
-    this.tools = new EditTools((tool) => this.#setTool(tool !== 'none'), events.onTakeBack);
     this.plots = new Plots(history, [RESIDUAL_PLOT], false);
-    this.timing = new TimingPanel(client, events.onError);
+    this.timing = new Timings(client, events.onError);
     this.options = cloudOptions((options) => {
       this.view.setOptions(options);
       events.onOptions(options);
     });
-    this.photos = new PhotoStrip((index) => this.#lookThrough(index));
     this.view.onLeave = () => this.photos.choose(undefined);
     this.page.layOut({
       name: 'reconstruct',
       options: <CloudOptions of={this.options} />,
-      over: made([this.view.legend, this.view.editing.legend]),
-      beside: <Made of={this.photos.large} />,
+      over: (
+        <>
+          <Made of={this.view.legend.element} />
+          <Made of={this.view.editing.legend.element} />
+        </>
+      ),
+      beside: <LargePhotograph of={this.photos} />,
       stage: (view, status) => (
         <>
           {view}
           {this.run.controls}
           {status}
-          <Made of={this.warning} />
-          {made([this.photos])}
+          <FitWarning>{this.warning}</FitWarning>
+          <PhotoStrip of={this.photos} />
         </>
       ),
       setup: (
@@ -115,15 +118,19 @@ export class ReconstructParts {
           <Section title={text('reconstruct.points')}>
             <DataPanel data={this.page.data} />
             <FigureOf shown={this.#figure} onVariant={events.onVariant} />
-            {made([this.setup])}
+            <CloudSetupFields state={this.setup} onChange={events.onChoice} />
           </Section>
           {this.page.paramsSection(true)}
-          <Section title={text('reconstruct.sectionEdits')}>{made([this.tools])}</Section>
+          <Section title={text('reconstruct.sectionEdits')}>
+            <EditControls state={this.tools} onClear={events.onTakeBack} />
+          </Section>
         </>
       ),
       results: (
         <>
-          <Section title={text('labs.sectionProgress')}>{made([this.phases])}</Section>
+          <Section title={text('labs.sectionProgress')}>
+            <PhaseList phases={this.#phases} />
+          </Section>
           <Section title={text('labs.sectionSurface')}>
             <WarningList warnings={this.page.warnings} />
             <MeasureTable measures={this.measures} extra={FIT_ROWS} />
@@ -131,10 +138,13 @@ export class ReconstructParts {
           {this.run.saveSection(this.view.subject, <Uses hasSurface={this.#hasSurface} events={events} />)}
           {this.run.finishSections(this.view.editing, this.measures)}
           <Section title={text('labs.sectionPlots')}>
-            {made([this.plots, this.#kernel])}
+            <Made of={this.plots.element} />
+            <Made of={this.#kernel.plot.element} />
             {this.run.plotData}
           </Section>
-          <Folded title={text('reconstruct.sectionTiming')}>{made([this.timing])}</Folded>
+          <Folded title={text('reconstruct.sectionTiming')}>
+            <TimingPanel of={this.timing} />
+          </Folded>
         </>
       ),
     });
@@ -160,7 +170,7 @@ export class ReconstructParts {
   clearSurface(): void {
     this.view.clearSurface();
     this.measures.clear();
-    this.warning.textContent = '';
+    this.warning.value = '';
   }
 
   /** Shows the parameters in force; hides the constants of kernels that are not in use. */
@@ -189,9 +199,14 @@ export class ReconstructParts {
   /** Enables and disables controls; `surface`: whether there is a complete surface. */
   showState(state: LabState, beneath: LabState, ready: boolean, surface: boolean): void {
     const idle = this.run.showState(state, beneath, ready, surface);
-    this.timing.enabled = idle;
+    this.timing.isEnabled.value = idle;
     this.run.exports.enabled = surface;
     this.#hasSurface.value = surface;
+  }
+
+  /** Shows the phases of a run. `going`: whether it is in progress. */
+  showPhases(history: History, going: boolean): void {
+    this.#phases.value = phasesOf(history, going);
   }
 
   dispose(): void {
@@ -226,4 +241,10 @@ function Uses({ hasSurface, events }: { hasSurface: ReadonlySignal<boolean>; eve
   );
 }
 
-const made = (all: { element: HTMLElement }[]) => all.map(({ element }, index) => <Made key={index} of={element} />);
+function FitWarning({ children }: { children: ComponentChildren }) {
+  return (
+    <p class="warning" role="status" data-warning="">
+      {children}
+    </p>
+  );
+}

@@ -121,14 +121,14 @@ export class ReconstructResults {
     if (measures) this.#ui.measures.showMeasures(measures);
     this.#ui.measures.extra.value = fitValues(fit);
     this.#ui.showChoice(fit.choice);
-    this.#ui.warning.textContent = fit.warning ?? '';
+    this.#ui.warning.value = fit.warning ?? '';
   }
 
   #showHistory(): void {
     const last = this.#history.reports.at(-1);
     this.#ui.run.transport.showReport(last && { ...last, progress: overallProgress(last) });
     this.#ui.page.warnings.showReport(last);
-    this.#ui.phases.update(this.#history, this.#states.value === 'running');
+    this.#ui.showPhases(this.#history, this.#states.value === 'running');
     this.#ui.plots.update();
     this.#ui.run.hasPlots.value = this.#history.reports.length > 0;
   }

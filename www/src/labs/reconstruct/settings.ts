@@ -64,7 +64,7 @@ export class ReconstructSettings {
   }
 
   get choice(): CloudChoice {
-    return this.#ui.setup.value;
+    return this.#ui.setup.choice.peek();
   }
 
   /** Takes over newly opened points and the settings of their model, and clears the undo history. */
@@ -109,8 +109,8 @@ export class ReconstructSettings {
 
   /** Edits the points by a click in the view with the selected tool. */
   pick(hit: Hit): Promise<void> {
-    const { tool, distance } = this.#ui.tools;
-    const length = distance * this.#ui.view.size;
+    const tool = this.#ui.tools.tool.peek();
+    const length = this.#ui.tools.distance * this.#ui.view.size;
     return this.#states.enqueue(async () => {
       if (!this.#cloud || !this.#states.canChange) return;
       const edits = applyClick(tool, hit, length, this.#edits, this.#cloud.points);
@@ -223,7 +223,7 @@ export class ReconstructSettings {
   }
 
   #showEdits(): void {
-    this.#ui.tools.show(this.#edits);
+    this.#ui.tools.edits.value = this.#edits;
     if (!this.#cloud) return;
     const { points, colors } = this.#cloud;
     const { added, removed, outside } = this.#edits;

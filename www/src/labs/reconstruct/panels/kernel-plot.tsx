@@ -1,7 +1,9 @@
+import { signal } from '@preact/signals';
+import type { ComponentChildren } from 'preact';
 import type { ParamValues } from '../../../engine/protocol';
-import { h } from '../../../kit/dom';
 import { figure } from '../../../kit/format';
 import { LinePlot } from '../../../kit/line-plot';
+import { elementOf } from '../../../kit/ui/mount';
 import { text } from '../../../texts';
 import { kernelParams, phi } from '../kernel';
 
@@ -11,33 +13,33 @@ const SAMPLES = 201;
 const FARTHEST = 2;
 
 /**
- * Plots the Reconstruct lab's current radial basis function φ(r), divided by its largest magnitude, because only its
- * shape matters.
+ * The Reconstruct lab's current radial basis function φ(r), divided by its largest magnitude, because only its shape
+ * matters.
  */
-export class KernelPlot {
-  readonly element: HTMLElement;
-  readonly #caption = h('figcaption', { 'data-plot': 'kernel' });
-  readonly #plot = new LinePlot({
-    ...{ title: text('pointPanels.kernelTitle'), across: 'r', name: 'kernel', height: HEIGHT, below: [this.#caption] },
+export class KernelCurve {
+  readonly #caption = signal('');
+  readonly plot = new LinePlot({
+    ...{ title: text('pointPanels.kernelTitle'), across: 'r', name: 'kernel', height: HEIGHT },
+    below: [elementOf(<Caption>{this.#caption}</Caption>)],
     lines: [{ label: 'φ', color: '--curve' }],
     x: { range: [0, FARTHEST] },
     y: { range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(0, high ?? 1)] },
     yAxis: { size: 36 },
   });
 
-  constructor() {
-    this.element = this.#plot.element;
-  }
-
   show(params: ParamValues): void {
     const kernel = kernelParams(params);
     const distances = Array.from({ length: SAMPLES }, (_, i) => (FARTHEST * i) / (SAMPLES - 1));
     const values = distances.map((r) => phi(kernel, r));
     const most = Math.max(...values.map(Math.abs));
-    this.#plot.show([distances, values.map((value) => value / most)]);
-    this.#caption.textContent = describeKernel(kernel.kernel, (r) => phi(kernel, r));
+    this.plot.show([distances, values.map((value) => value / most)]);
+    this.#caption.value = describeKernel(kernel.kernel, (r) => phi(kernel, r));
   }
 }
+
+const Caption = ({ children }: { children: ComponentChildren }) => (
+  <figcaption data-plot="kernel">{children}</figcaption>
+);
 
 function describeKernel(kernel: string, value: (r: number) => number): string {
   const unit = text('pointPanels.kernelUnit');
