@@ -74,10 +74,12 @@ export function token(name: string): string {
 
 /**
  * Calls `callback` whenever the user's preference for a light or dark scheme changes, to redraw what does not follow
- * the style sheet.
+ * the style sheet. Returns what ends that.
  */
-export function onSchemeChange(callback: () => void): void {
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', callback);
+export function onSchemeChange(callback: () => void): () => void {
+  const scheme = matchMedia('(prefers-color-scheme: dark)');
+  scheme.addEventListener('change', callback);
+  return () => scheme.removeEventListener('change', callback);
 }
 
 /** Returns whether the user prefers reduced motion, as set in the system or browser. */

@@ -9,7 +9,7 @@ import type {
   Vec3,
   VolumeView,
 } from '../engine/protocol';
-import { onSchemeChange, token } from '../kit/dom';
+import { token } from '../kit/dom';
 import type { ColorMode, SlicePlacement } from '../kit/view';
 import { nearestVoxel, slicePlane, toWorld } from './anatomy';
 import { crossSection } from './cross-section';
@@ -91,7 +91,7 @@ export class Stage {
       this.#updateSections();
     });
     this.#recolor();
-    onSchemeChange(() => this.#recolor());
+    this.#viewport.onScheme = () => this.#recolor();
   }
 
   /** Shows another volume; crosshair, camera and display stay if it is another frame of the one before. */

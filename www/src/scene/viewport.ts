@@ -16,6 +16,7 @@ import {
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
 import type { Vec3 } from '../engine/protocol';
+import { onSchemeChange } from '../kit/dom';
 import { anatomicalSigns, type Grid } from './anatomy';
 import { applyPinhole, type PinholeCamera } from './pinhole';
 import { WebGlRendering } from './rendering';
@@ -67,6 +68,9 @@ export class Viewport {
   takesKey: (event: KeyboardEvent) => boolean = () => false;
   /** Called when the view leaves the pose of a photograph's camera. */
   onLeave: () => void = () => undefined;
+  /** Called when the user's preference for a light or dark scheme changes. */
+  onScheme: () => void = () => undefined;
+  readonly #ignoreScheme = onSchemeChange(() => this.onScheme());
   /** Planes beyond which surfaces made with them are not drawn; see {@link cut}. */
   readonly clipping: Plane[] = [];
   #through: PinholeCamera | undefined;
@@ -295,6 +299,7 @@ export class Viewport {
     this.#disposed = true;
     cancelAnimationFrame(this.#pending);
     this.#observer.disconnect();
+    this.#ignoreScheme();
     this.#controls.dispose();
     this.#rendering.dispose();
   }

@@ -5,7 +5,7 @@ import { h } from '../../kit/dom';
 import { COVERAGE_GUIDE } from '../../kit/guides';
 import type { History } from '../../kit/history';
 import { MeasureTable, SurfaceMeasures } from '../../kit/measures';
-import { ENERGY_PLOTS, Plots } from '../../kit/plots';
+import { ENERGY_PLOTS, Plots, RunPlots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
 import { FigureOf } from '../../kit/ui/figure';
 import { Made } from '../../kit/ui/mount';
@@ -167,7 +167,7 @@ export class ExtractParts {
           {this.run.saveSection(this.stage.subject, <ToSculpt isReady={this.#isReady} onSculpt={events.onSculpt} />)}
           {this.run.finishSections(this.stage.editing, this.measures)}
           <Section title={text('labs.sectionProgress')}>
-            {made([this.#plots])}
+            <RunPlots plots={this.#plots} />
             {this.run.plotData}
           </Section>
           <Section title={text('extract.sectionEvents')}>{made([this.#log])}</Section>

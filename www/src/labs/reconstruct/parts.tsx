@@ -4,7 +4,7 @@ import type { ImplicitChoice } from 'vesicle';
 import { FileChooser } from '../../importers/chooser';
 import { History } from '../../kit/history';
 import { MeasureTable, SurfaceMeasures } from '../../kit/measures';
-import { Plots } from '../../kit/plots';
+import { Plots, RunPlots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
 import { FigureOf } from '../../kit/ui/figure';
 import { Made } from '../../kit/ui/mount';
@@ -23,7 +23,7 @@ import { cloudData, factsOf } from './page';
 import { CloudOptions, cloudOptions, offerCameras } from './panels/cloud-options';
 import { type CloudChoice, CloudSetup, CloudSetupFields } from './panels/cloud-setup';
 import { EditControls, EditTools } from './panels/edit-tools';
-import { KernelCurve } from './panels/kernel-plot';
+import { KernelPlot } from './panels/kernel-plot';
 import { PhaseList, phasesOf } from './panels/phases';
 import { LargePhotograph, Photographs, PhotoStrip } from './panels/photo-strip';
 import { TimingPanel, Timings } from './panels/timing';
@@ -65,7 +65,8 @@ export class ReconstructParts {
   readonly #figure = signal<{ preset: CloudPreset | undefined; variant: CloudVariant | undefined }>({
     ...{ preset: undefined, variant: undefined },
   });
-  readonly #kernel = new KernelCurve();
+  /** Parameters whose kernel is plotted. */
+  readonly #kernelParams = signal<ParamValues>({});
   readonly #phases = signal(phasesOf(new History(), false));
   /** Whether there is a complete surface. */
   readonly #hasSurface = signal(false);
@@ -138,8 +139,8 @@ export class ReconstructParts {
           {this.run.saveSection(this.view.subject, <Uses hasSurface={this.#hasSurface} events={events} />)}
           {this.run.finishSections(this.view.editing, this.measures)}
           <Section title={text('labs.sectionPlots')}>
-            <Made of={this.plots.element} />
-            <Made of={this.#kernel.plot.element} />
+            <RunPlots plots={this.plots} />
+            <KernelPlot params={this.#kernelParams} />
             {this.run.plotData}
           </Section>
           <Folded title={text('reconstruct.sectionTiming')}>
@@ -193,7 +194,8 @@ export class ReconstructParts {
 
   #showKernel(): void {
     const { delta } = this.#params;
-    this.#kernel.show({ ...this.#params, ...(delta === 'auto' && this.#choice && { delta: this.#choice.delta }) });
+    const chosen = delta === 'auto' && this.#choice && { delta: this.#choice.delta };
+    this.#kernelParams.value = { ...this.#params, ...chosen };
   }
 
   /** Enables and disables controls; `surface`: whether there is a complete surface. */

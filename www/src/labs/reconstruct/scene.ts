@@ -1,6 +1,6 @@
 import { Box3, Plane, type Raycaster, Vector3 } from 'three';
 import type { PointArray, Surface, Vec3 } from '../../engine/protocol';
-import { onSchemeChange, token } from '../../kit/dom';
+import { token } from '../../kit/dom';
 import { PointCloud } from '../../scene/cloud';
 import { EditedView } from '../../scene/edited-view';
 import { Legend } from '../../scene/legend';
@@ -72,7 +72,7 @@ export class ReconstructionView {
       this.#surface.coarse = hurried;
     };
     this.#recolor();
-    onSchemeChange(() => this.#recolor());
+    this.#viewport.onScheme = () => this.#recolor();
   }
 
   /** Callback for when the view leaves the pose of a photograph's camera. */

@@ -4,7 +4,7 @@ import type { Warning } from '../../engine/warnings';
 import { FileChooser } from '../../importers/chooser';
 import type { History } from '../../kit/history';
 import { MeasureTable, SurfaceMeasures } from '../../kit/measures';
-import { Plots } from '../../kit/plots';
+import { Plots, RunPlots } from '../../kit/plots';
 import type { LabState } from '../../kit/state';
 import { FigureOf } from '../../kit/ui/figure';
 import { Made } from '../../kit/ui/mount';
@@ -136,7 +136,7 @@ export class SculptParts {
           {this.run.saveSection(this.view.subject)}
           {this.run.finishSections(this.view.editing, this.measures)}
           <Section title={text('labs.sectionPlots')}>
-            <Made of={this.plots.element} />
+            <RunPlots plots={this.plots} />
             {this.run.plotData}
           </Section>
         </>

@@ -1,6 +1,6 @@
 import { Box3, Group, type Raycaster, type Texture, Vector3 } from 'three';
 import type { Surface, Vec3 } from '../../engine/protocol';
-import { onSchemeChange, token } from '../../kit/dom';
+import { token } from '../../kit/dom';
 import { EditedView } from '../../scene/edited-view';
 import { Legend } from '../../scene/legend';
 import type { PictureSubject } from '../../scene/pictures';
@@ -90,7 +90,7 @@ export class SculptureView {
       this.#placeInRow();
     };
     this.#recolor();
-    onSchemeChange(() => this.#recolor());
+    this.#viewport.onScheme = () => this.#recolor();
   }
 
   /**

@@ -1,6 +1,6 @@
 import type { Raycaster } from 'three';
 import type { Surface, Vec3, VolumeView } from '../../engine/protocol';
-import { onSchemeChange, token } from '../../kit/dom';
+import { token } from '../../kit/dom';
 import { type Axis, nearestVoxel, toWorld } from '../../scene/anatomy';
 import { type Grip, SlicePanel } from '../../scene/panel';
 import type { PictureSubject } from '../../scene/pictures';
@@ -55,7 +55,7 @@ export class SegmentView {
       for (const { object } of this.#surfaces.values()) object.coarse = interactive;
       this.#scene?.placeSlices(this.#options.slices, viewer);
     };
-    onSchemeChange(() => this.#recolor());
+    this.#viewport.onScheme = () => this.#recolor();
   }
 
   /** Shows another volume, with its label map, and no surfaces yet. */

@@ -29,7 +29,7 @@ import { FrameTable } from './panels/frame-table';
 import { ObjectChoice, type ObjectEvents } from './panels/object-choice';
 import { PreparationControls } from './panels/preparation';
 import { RegionControls, type RegionEvents } from './panels/region';
-import { VolumeCurve } from './panels/volume-curve';
+import { NO_VOLUMES, VolumeCurve, type VolumeCurves } from './panels/volume-curve';
 import type { TrackPreset, TrackVariant } from './presets';
 import type { Alternative, OpenedImage, ParamSpec, ParamValues, Preparation, Vec3 } from './protocol';
 import { TrackView } from './scene';
@@ -61,7 +61,9 @@ export class TrackParts {
   readonly region: RegionControls;
   readonly object: ObjectChoice;
   readonly frames: FrameBar;
-  readonly curve: VolumeCurve;
+  readonly #curves = signal(NO_VOLUMES);
+  #nextCurves = NO_VOLUMES;
+  #curvesPending = 0;
   readonly stills: FigureRow;
   readonly compare: TrackComparePanel;
   readonly #onParam: PartEvents['onParam'];
@@ -107,7 +109,6 @@ export class TrackParts {
       this.frames.stop();
       events.onFrame(frame);
     };
-    this.curve = new VolumeCurve(stopAt);
     this.stills = new FigureRow((voxel: Vec3) => this.view.goToVoxel(voxel), stopAt);
     this.compare = new TrackComparePanel({ onStart: events.onCompare, onCancel: events.onCancelCompare });
     this.options = new ViewOptions(TRACK_VIEW, (options) => {
@@ -151,7 +152,7 @@ export class TrackParts {
       results: (
         <>
           <Section title={text('track.sectionCurve')}>
-            {made([this.curve])}
+            <VolumeCurve curves={this.#curves} onFrame={stopAt} />
             <Made of={this.table.warnings} />
           </Section>
           <Section title={text('track.sectionSurface')}>
@@ -218,7 +219,17 @@ export class TrackParts {
     this.compare.enabled = idle && beneath === 'done';
   }
 
+  /** Shows volume curves at the next animation frame. */
+  showCurves(curves: VolumeCurves): void {
+    this.#nextCurves = curves;
+    this.#curvesPending ||= requestAnimationFrame(() => {
+      this.#curvesPending = 0;
+      this.#curves.value = this.#nextCurves;
+    });
+  }
+
   dispose(): void {
+    cancelAnimationFrame(this.#curvesPending);
     this.run.dispose();
     this.frames.stop();
     this.view.dispose();

@@ -192,11 +192,11 @@ export class TrackResults {
 
   /** Shows the curve of the volume enclosed in each frame, and the table of frames. */
   showCurve(): void {
-    const { curve, table } = this.#ui;
+    const { table } = this.#ui;
     const frames = this.#image?.volume.frames ?? 1;
     const facts = this.#frames.map((one) => one.facts);
     const volumes = facts.map(({ volume }) => volume);
-    curve.show({
+    this.#ui.showCurves({
       volumes,
       truth: this.truth,
       other: this.#comparedVolumes,

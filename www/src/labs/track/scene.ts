@@ -1,6 +1,6 @@
 import { Box3, Vector3 } from 'three';
 import type { LevelView, Surface, Vec3, VolumeView } from '../../engine/protocol';
-import { onSchemeChange, token } from '../../kit/dom';
+import { token } from '../../kit/dom';
 import { type Axis, nearestVoxel, slicePlane, toWorld } from '../../scene/anatomy';
 import { PointCloud } from '../../scene/cloud';
 import { crossSection } from '../../scene/cross-section';
@@ -70,7 +70,7 @@ export class TrackView {
     this.#viewport.onDraw = (viewer) => this.#placeSlices(viewer);
     this.editing = new EditedView(this.#viewport, this.#surface, () => this.#updateSections());
     this.#recolor();
-    onSchemeChange(() => this.#recolor());
+    this.#viewport.onScheme = () => this.#recolor();
   }
 
   /**

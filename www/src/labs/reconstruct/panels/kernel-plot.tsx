@@ -1,9 +1,7 @@
-import { signal } from '@preact/signals';
-import type { ComponentChildren } from 'preact';
+import { type ReadonlySignal, useComputed } from '@preact/signals';
 import type { ParamValues } from '../../../engine/protocol';
 import { figure } from '../../../kit/format';
 import { LinePlot } from '../../../kit/line-plot';
-import { elementOf } from '../../../kit/ui/mount';
 import { text } from '../../../texts';
 import { kernelParams, phi } from '../kernel';
 
@@ -13,33 +11,32 @@ const SAMPLES = 201;
 const FARTHEST = 2;
 
 /**
- * The Reconstruct lab's current radial basis function φ(r), divided by its largest magnitude, because only its shape
- * matters.
+ * Plot of the Reconstruct lab's current radial basis function φ(r), divided by its largest magnitude, because only its
+ * shape matters.
  */
-export class KernelCurve {
-  readonly #caption = signal('');
-  readonly plot = new LinePlot({
-    ...{ title: text('pointPanels.kernelTitle'), across: 'r', name: 'kernel', height: HEIGHT },
-    below: [elementOf(<Caption>{this.#caption}</Caption>)],
-    lines: [{ label: 'φ', color: '--curve' }],
-    x: { range: [0, FARTHEST] },
-    y: { range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(0, high ?? 1)] },
-    yAxis: { size: 36 },
-  });
-
-  show(params: ParamValues): void {
-    const kernel = kernelParams(params);
-    const distances = Array.from({ length: SAMPLES }, (_, i) => (FARTHEST * i) / (SAMPLES - 1));
-    const values = distances.map((r) => phi(kernel, r));
-    const most = Math.max(...values.map(Math.abs));
-    this.plot.show([distances, values.map((value) => value / most)]);
-    this.#caption.value = describeKernel(kernel.kernel, (r) => phi(kernel, r));
-  }
+export function KernelPlot({ params }: { params: ReadonlySignal<ParamValues> }) {
+  const kernel = useComputed(() => kernelParams(params.value));
+  const columns = useComputed(() => curveOf((r) => phi(kernel.value, r)));
+  return (
+    <LinePlot
+      {...{ title: text('pointPanels.kernelTitle'), across: 'r', name: 'kernel', height: HEIGHT }}
+      columns={columns.value}
+      lines={[{ label: 'φ', color: '--curve' }]}
+      x={{ range: [0, FARTHEST] }}
+      y={{ range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(0, high ?? 1)] }}
+      yAxis={{ size: 36 }}
+    >
+      <figcaption data-plot="kernel">{describeKernel(kernel.value.kernel, (r) => phi(kernel.value, r))}</figcaption>
+    </LinePlot>
+  );
 }
 
-const Caption = ({ children }: { children: ComponentChildren }) => (
-  <figcaption data-plot="kernel">{children}</figcaption>
-);
+function curveOf(value: (r: number) => number): [number[], number[]] {
+  const distances = Array.from({ length: SAMPLES }, (_, i) => (FARTHEST * i) / (SAMPLES - 1));
+  const values = distances.map(value);
+  const most = Math.max(...values.map(Math.abs));
+  return [distances, values.map((one) => one / most)];
+}
 
 function describeKernel(kernel: string, value: (r: number) => number): string {
   const unit = text('pointPanels.kernelUnit');

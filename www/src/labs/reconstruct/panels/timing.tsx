@@ -1,8 +1,7 @@
 import { signal } from '@preact/signals';
+import { useMemo } from 'preact/hooks';
 import { count, figure, milliseconds } from '../../../kit/format';
-import { LinePlot } from '../../../kit/line-plot';
-import { legendOf } from '../../../kit/plots';
-import { elementOf, Made } from '../../../kit/ui/mount';
+import { LinePlot, PlotLegend } from '../../../kit/line-plot';
 import { Help } from '../../../kit/ui/parts';
 import { begun, ended, IDLE, Task, type TaskState } from '../../../kit/ui/task';
 import { text } from '../../../texts';
@@ -12,6 +11,10 @@ import type { Timing } from '../protocol';
 const SIZES = [250, 500, 1000, 2000, 3000, 4500, 6000];
 const KERNELS = ['multi-order', 'thin-plate'] as const;
 const COLORS = { 'multi-order': '--curve', 'thin-plate': '--cut' } as const;
+const KEYS = [
+  { name: 'axial', label: KERNELS[0] },
+  { name: 'annular', label: KERNELS[1] },
+];
 const HEIGHT = 160;
 
 /**
@@ -22,42 +25,27 @@ export class Timings {
   readonly all = signal<readonly Timing[]>([]);
   readonly task = signal<TaskState>(IDLE);
   readonly isEnabled = signal(false);
-  readonly plot: LinePlot;
   readonly #client: ReconstructClient;
   readonly #onError: (title: string, error: unknown) => void;
 
   constructor(client: ReconstructClient, onError: (title: string, error: unknown) => void) {
     this.#client = client;
     this.#onError = onError;
-    const keys = [
-      { name: 'axial', label: KERNELS[0] },
-      { name: 'annular', label: KERNELS[1] },
-    ];
-    this.plot = new LinePlot({
-      ...{ title: text('pointPanels.timingFigure'), name: 'timing', height: HEIGHT },
-      across: text('pointPanels.columnConstraints'),
-      lines: KERNELS.map((label) => ({ label, color: COLORS[label], dots: true })),
-      x: { range: from0 },
-      y: { range: from0 },
-      yAxis: { size: 36 },
-      below: [legendOf(keys), elementOf(<TimingTable of={this} />)],
-    });
-    this.#show([]);
   }
 
   clear(): void {
-    this.task.value = IDLE;
-    this.#show([]);
+    this.task.value = { ...this.task.peek(), message: '' };
+    this.all.value = [];
   }
 
   add(timing: Timing): void {
     const all = [...this.all.peek(), timing];
     this.task.value = { ...this.task.peek(), progress: all.length };
-    this.#show(all);
+    this.all.value = all;
   }
 
   async measure(): Promise<void> {
-    this.#show([]);
+    this.all.value = [];
     this.task.value = begun(text('controls.measuring'));
     try {
       const kernels = [...KERNELS];
@@ -71,18 +59,6 @@ export class Timings {
 
   cancel(): void {
     void this.#client.request('cancelTiming', undefined);
-  }
-
-  #show(all: readonly Timing[]): void {
-    this.all.value = all;
-    this.plot.element.hidden = all.length === 0;
-    const sizes = sizesOf(all);
-    const seconds = (kernel: string) =>
-      sizes.map((size) => {
-        const one = timingOf(all, kernel, size);
-        return one ? one.milliseconds / 1000 : null;
-      });
-    this.plot.show([sizes, ...KERNELS.map(seconds)]);
   }
 }
 
@@ -98,9 +74,39 @@ export function TimingPanel({ of }: { of: Timings }) {
         onStart={() => void of.measure()}
         onCancel={() => of.cancel()}
       />
-      <Made of={of.plot.element} />
+      <TimingPlot of={of} />
     </div>
   );
+}
+
+function TimingPlot({ of }: { of: Timings }) {
+  const all = of.all.value;
+  const columns = useMemo(() => columnsOf(all), [all]);
+  return (
+    <LinePlot
+      {...{ title: text('pointPanels.timingFigure'), name: 'timing', height: HEIGHT, hidden: all.length === 0 }}
+      across={text('pointPanels.columnConstraints')}
+      lines={KERNELS.map((label) => ({ label, color: COLORS[label], dots: true }))}
+      columns={columns}
+      x={{ range: from0 }}
+      y={{ range: from0 }}
+      yAxis={{ size: 36 }}
+    >
+      <PlotLegend keys={KEYS} />
+      <TimingTable of={of} />
+    </LinePlot>
+  );
+}
+
+/** Returns the numbers of constraints, and the seconds of each kernel. */
+function columnsOf(all: readonly Timing[]): (number | null)[][] {
+  const sizes = sizesOf(all);
+  const seconds = (kernel: string) =>
+    sizes.map((size) => {
+      const one = timingOf(all, kernel, size);
+      return one ? one.milliseconds / 1000 : null;
+    });
+  return [sizes, ...KERNELS.map(seconds)];
 }
 
 function TimingTable({ of }: { of: Timings }) {

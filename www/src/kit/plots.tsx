@@ -1,12 +1,13 @@
+import { signal } from '@preact/signals';
 import type uPlot from 'uplot';
 import type { StepReport } from '../engine/protocol';
 
 import { type TextKey, text } from '../texts';
-import { h } from './dom';
+import type { PlotLine } from './curve-plot';
 import { count, figure } from './format';
 import type { History } from './history';
 import { totals } from './history';
-import { LinePlot, type PlotLine } from './line-plot';
+import { LinePlot, PlotLegend } from './line-plot';
 import type { PlotMark } from './plot-svg';
 import { PlotTable } from './plot-table';
 
@@ -60,29 +61,69 @@ const KEYS = [
   { name: 'seeds', color: '--seed', label: text('measures.seededEvent') },
 ];
 
+type Columns = (number | null)[][];
+
+/** One of the plots of a run, as it is shown. */
+class PlotState {
+  readonly kind: PlotKind;
+  readonly shown = signal<{ columns: Columns; marks: PlotMark[]; caption: string }>({
+    ...{ columns: [], marks: [], caption: '' },
+  });
+  /** Plotted data: iterations, followed by the values of each curve, for the reports of the current run so far. */
+  #columns: Columns;
+  #run: readonly StepReport[] | undefined;
+
+  constructor(kind: PlotKind) {
+    this.kind = kind;
+    this.#columns = this.#none();
+    this.shown.value = { columns: this.#columns, marks: [], caption: '' };
+  }
+
+  update(history: History): void {
+    const { reports } = history;
+    this.#extend(reports);
+    const caption = reports.length > 0 ? this.kind.describe(history) : text('measures.noSteps');
+    // A new list, so that the plot is drawn again: its columns are appended to.
+    this.shown.value = { columns: [...this.#columns], marks: marksOf(history), caption };
+  }
+
+  #none(): Columns {
+    return [[], ...this.kind.curves.map(() => [])];
+  }
+
+  /** Appends the data of new reports only: runs have thousands of steps. */
+  #extend(reports: readonly StepReport[]): void {
+    const { curves, log } = this.kind;
+    if (reports !== this.#run) this.#columns = this.#none();
+    this.#run = reports;
+    const [iterations = [], ...values] = this.#columns;
+    for (const report of reports.slice(iterations.length)) {
+      iterations.push(report.iteration);
+      for (const [i, { of }] of curves.entries()) values[i]?.push(plottable(of(report), log));
+    }
+  }
+}
+
 /** Live plots of a run over its iterations, with level changes and topology events marked. */
 export class Plots {
-  readonly element: HTMLElement;
-  readonly #plots: Plot[];
+  readonly all: readonly PlotState[];
+  /** Whether a legend and a description of the topology events are shown. */
+  readonly hasEvents: boolean;
+  readonly events = signal('');
+  readonly run = signal<{ reports: readonly StepReport[] }>({ reports: [] });
   readonly #history: History;
-  readonly #events = h('p', { class: 'help', 'data-plot-events': '' });
-  readonly #table: PlotTable;
-  readonly #stale = new Set<Plot>();
+  readonly #stale = new Set<PlotState>();
   #pending = 0;
 
-  /** `events`: whether a legend and a description of the topology events are shown. */
-  constructor(history: History, kinds: PlotKind[], events: boolean) {
+  constructor(history: History, kinds: PlotKind[], hasEvents: boolean) {
     this.#history = history;
-    this.#plots = kinds.map((kind) => new Plot(kind, history, events ? KEYS : KEYS.slice(0, 1)));
-    this.element = h('div', { class: 'plots' }, ...this.#plots.map((plot) => plot.element));
-    this.#table = new PlotTable(kinds.flatMap(({ curves }) => curves));
-    if (events) this.element.append(legendOf(KEYS), this.#events);
-    this.element.append(this.#table.element);
+    this.all = kinds.map((kind) => new PlotState(kind));
+    this.hasEvents = hasEvents;
   }
 
   /** Redraws the plots in the next animation frames, one plot in each: all at once would delay other rendering. */
   update(): void {
-    for (const plot of this.#plots) this.#stale.add(plot);
+    for (const plot of this.all) this.#stale.add(plot);
     this.#pending ||= requestAnimationFrame(() => this.#redrawOne());
   }
 
@@ -97,64 +138,49 @@ export class Plots {
       this.#pending = requestAnimationFrame(() => this.#redrawOne());
       return;
     }
-    this.#events.textContent = describeEvents(this.#history);
-    this.#table.update(this.#history.reports);
+    this.events.value = describeEvents(this.#history);
+    this.run.value = { reports: this.#history.reports };
   }
 }
 
-/** Creates the legend of a plot; the name of each key is the class of its mark. */
-export function legendOf(keys: { name: string; label: string }[]): HTMLElement {
-  const key = ({ name, label }: (typeof keys)[number]) =>
-    h('span', {}, h('span', { class: `mark ${name}`, 'aria-hidden': 'true' }), label);
-  return h('p', { class: 'legend' }, ...keys.map(key));
+/** The plots of a run, and their data as a table. */
+export function RunPlots({ plots }: { plots: Plots }) {
+  const { all, hasEvents } = plots;
+  return (
+    <div class="plots">
+      {all.map((plot) => (
+        <RunPlot key={plot.kind.title} plot={plot} keys={hasEvents ? KEYS : KEYS.slice(0, 1)} />
+      ))}
+      {hasEvents && <PlotLegend keys={KEYS} />}
+      {hasEvents && (
+        <p class="help" data-plot-events="">
+          {plots.events}
+        </p>
+      )}
+      <PlotTable curves={all.flatMap(({ kind }) => kind.curves)} run={plots.run} />
+    </div>
+  );
 }
 
-class Plot {
-  readonly element: HTMLElement;
-  readonly #kind: PlotKind;
-  readonly #plot: LinePlot;
-  readonly #caption = h('figcaption');
-  /** Plotted data: iterations, followed by the values of each curve, for the reports of the current run so far. */
-  #columns: (number | null)[][] = [];
-  #run: readonly StepReport[] | undefined;
-
-  constructor(kind: PlotKind, history: History, keys: PlotLine[]) {
-    this.#kind = kind;
-    const { title, curves, log } = kind;
-    this.#plot = new LinePlot({
-      ...{ title, lines: curves, height: PLOT_HEIGHT, top: MARK_HEIGHT, keys, below: [this.#caption] },
-      across: text('measures.columnIteration'),
-      x: { range: iterationRange },
-      y: log ? { distr: 3, range: logRange } : { range: valueRange },
-      yAxis: {
+function RunPlot({ plot, keys }: { plot: PlotState; keys: typeof KEYS }) {
+  const { title, curves, log } = plot.kind;
+  const { columns, marks, caption } = plot.shown.value;
+  return (
+    <LinePlot
+      {...{ title, lines: curves, columns, marks, keys, height: PLOT_HEIGHT, top: MARK_HEIGHT }}
+      across={text('measures.columnIteration')}
+      x={{ range: iterationRange }}
+      y={log ? { distr: 3, range: logRange } : { range: valueRange }}
+      yAxis={{
         size: 52,
         values: (_, ticks) => ticks.map((tick) => tickLabel(tick, log)),
         // uPlot would omit the labels of some powers of ten.
         ...(log && { splits: decades, filter: (_: uPlot, ticks: number[]) => ticks }),
-      },
-      marks: () => marksOf(history),
-    });
-    this.element = this.#plot.element;
-  }
-
-  update(history: History): void {
-    const { reports } = history;
-    this.#extend(reports);
-    this.#plot.show(this.#columns);
-    this.#caption.textContent = reports.length > 0 ? this.#kind.describe(history) : text('measures.noSteps');
-  }
-
-  /** Appends the data of new reports only: runs have thousands of steps. */
-  #extend(reports: readonly StepReport[]): void {
-    const { curves, log } = this.#kind;
-    if (reports !== this.#run) this.#columns = [[], ...curves.map(() => [])];
-    this.#run = reports;
-    const [iterations = [], ...values] = this.#columns;
-    for (const report of reports.slice(iterations.length)) {
-      iterations.push(report.iteration);
-      for (const [i, { of }] of curves.entries()) values[i]?.push(plottable(of(report), log));
-    }
-  }
+      }}
+    >
+      <figcaption>{caption}</figcaption>
+    </LinePlot>
+  );
 }
 
 /** Returns a value to plot, or null if it cannot be drawn: not finite or, on a logarithmic axis, zero or below. */

@@ -1,9 +1,8 @@
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
 
-import { LANGUAGE, text } from '../texts';
-import { h, onSchemeChange, token } from './dom';
-import { download } from './download';
+import { LANGUAGE } from '../texts';
+import { onSchemeChange, token } from './dom';
 import { type PlotAxis, type PlotMark, plotSvg } from './plot-svg';
 
 /** Height of the tick marks of one kind of event, CSS pixels. */
@@ -23,73 +22,73 @@ export interface PlotLine {
   dots?: boolean;
 }
 
-interface PlotParts {
+/** Parts of a plot that may change; all others stay. */
+export interface PlotContent {
   title: string;
+  lines: readonly PlotLine[];
+  /** The positions along x, then the values of each line; null interrupts a line. */
+  columns: readonly (readonly (number | null)[])[];
+  marks?: readonly PlotMark[];
+  /** Entries of the legend of the saved plot besides the lines. */
+  keys?: readonly PlotLine[];
+}
+
+export interface PlotParts extends PlotContent {
   /** Title of the x axis. */
   across: string;
-  /** Further class of the plot's element, for its height. */
-  name?: string;
   height: number;
-  lines: PlotLine[];
   x: uPlot.Scale;
   y: uPlot.Scale;
   xAxis?: uPlot.Axis;
   yAxis: uPlot.Axis;
   /** Space above the plot for the names of marks, CSS pixels. */
   top?: number;
-  marks?: () => PlotMark[];
-  /** Entries of the legend of the saved plot besides the lines. */
-  keys?: PlotLine[];
-  /** Elements below the plot. */
-  below: Node[];
+  /** Called with the position along x of a click. */
+  onPick?: ((x: number) => void) | undefined;
 }
 
-/** A figure with a plot of curves, which can be saved as SVG. */
-export class LinePlot {
-  readonly element: HTMLElement;
-  readonly plot: uPlot;
+/** Drawing of curves in an element. */
+export class CurvePlot {
   readonly #parts: PlotParts;
-  readonly #heading = h('h3');
-  readonly #save = h(
-    'button',
-    { type: 'button', class: 'quiet', onclick: () => this.#download() },
-    text('pictures.svg'),
-  );
+  #content: PlotContent;
+  readonly #plot: uPlot;
   /** Labelled values of the x and the y axis, as drawn last. */
   readonly #ticks: PlotAxis['ticks'][] = [[], []];
+  readonly #size: ResizeObserver;
+  readonly #ignoreScheme: () => void;
 
-  constructor(parts: PlotParts) {
+  constructor(holder: HTMLElement, parts: PlotParts) {
     this.#parts = parts;
-    const { name = '', height, lines, below } = parts;
-    const holder = h('div', { class: `plot ${name}`.trim(), 'aria-hidden': 'true' });
-    this.element = h('figure', {}, h('div', { class: 'row plot-head' }, this.#heading, this.#save), holder, ...below);
-    this.plot = new uPlot(this.#options(), [[], ...lines.map(() => [])] as unknown as uPlot.AlignedData, holder);
-    new ResizeObserver(() => {
-      if (holder.clientWidth > 0) this.plot.setSize({ width: holder.clientWidth, height });
-    }).observe(holder);
-    onSchemeChange(() => this.plot.redraw());
-    this.title = parts.title;
+    this.#content = parts;
+    this.#plot = new uPlot(this.#options(), dataOf(parts), holder);
+    this.#size = new ResizeObserver(() => {
+      if (holder.clientWidth > 0) this.#plot.setSize({ width: holder.clientWidth, height: parts.height });
+    });
+    this.#size.observe(holder);
+    this.#ignoreScheme = onSchemeChange(() => this.#plot.redraw());
+    const { over } = this.#plot;
+    over.addEventListener('click', ({ offsetX }) => parts.onPick?.(this.#plot.posToVal(offsetX, 'x')));
   }
 
-  set title(title: string) {
-    this.#parts.title = title;
-    this.#heading.textContent = title;
-    this.#save.setAttribute('aria-label', text('pictures.svgOf', { plot: title }));
+  show(content: PlotContent): void {
+    this.#content = content;
+    this.#plot.setData(dataOf(content));
   }
 
-  /** Shows other data: the positions along x, then the values of each line; null interrupts a line. */
-  show(columns: (number | null)[][]): void {
-    this.plot.setData(columns as uPlot.AlignedData);
+  dispose(): void {
+    this.#ignoreScheme();
+    this.#size.disconnect();
+    this.#plot.destroy();
   }
 
   /** Returns the plot as an SVG file, in the present colours. */
   toSvg(): string {
-    const { lines, marks, keys = [], title, across } = this.#parts;
+    const { lines, marks = [], keys = [], title } = this.#content;
     const colored = <T extends { color: string }>(one: T) => ({ ...one, color: token(one.color) });
-    const [positions, ...columns] = this.plot.data;
+    const [positions, ...columns] = this.#plot.data;
     return plotSvg({
       title,
-      across,
+      across: this.#parts.across,
       x: this.#axis('x', 0),
       y: this.#axis('y', 1),
       curves: lines.map((line, i) => ({
@@ -97,27 +96,19 @@ export class LinePlot {
         values: [...(columns[i] ?? [])].map((value) => value ?? null),
       })),
       positions: [...positions],
-      marks: (marks?.() ?? []).map(colored),
+      marks: marks.map(colored),
       keys: keys.map(colored),
       colors: { background: token('--panel'), text: token('--text'), lines: token('--line') },
     });
   }
 
-  #download(): void {
-    const name = this.#parts.title
-      .toLowerCase()
-      .replaceAll(/[^\p{L}\p{N}]+/gu, '-')
-      .replaceAll(/^-|-$/g, '');
-    download(`${name}.svg`, new TextEncoder().encode(this.toSvg()), 'image/svg+xml');
-  }
-
   #axis(scale: 'x' | 'y', index: 0 | 1): PlotAxis {
-    const { min = 0, max = 1, distr } = this.plot.scales[scale] ?? {};
+    const { min = 0, max = 1, distr } = this.#plot.scales[scale] ?? {};
     return { min: min ?? 0, max: max ?? 1, log: distr === 3, ticks: this.#ticks[index] ?? [] };
   }
 
   #options(): uPlot.Options {
-    const { height, lines, x, y, xAxis = {}, yAxis, top = 8, marks } = this.#parts;
+    const { height, lines, x, y, xAxis = {}, yAxis, top = 8 } = this.#parts;
     const axis = (given: uPlot.Axis, index: 0 | 1): uPlot.Axis => ({
       stroke: () => token('--muted'),
       grid: { stroke: () => token('--line'), width: 1 },
@@ -142,10 +133,12 @@ export class LinePlot {
       scales: { x: { time: false, ...x }, y },
       axes: [axis({ size: 24, ...xAxis }, 0), axis(yAxis, 1)],
       series: [{}, ...lines.map(seriesFor)],
-      hooks: { drawClear: [(plot) => drawMarks(plot, marks?.() ?? [])] },
+      hooks: { drawClear: [(plot) => drawMarks(plot, this.#content.marks ?? [])] },
     };
   }
 }
+
+const dataOf = ({ columns }: PlotContent) => columns as uPlot.AlignedData;
 
 /** Returns the width of a vertical axis in which its labels have room, CSS pixels. */
 export function roomFor(labels: readonly string[] | null): number {
@@ -159,7 +152,7 @@ function seriesFor({ label, color, dash, dots = false }: PlotLine): uPlot.Series
 }
 
 /** Draws lines with their names above, and tick marks at the bottom, one lane per kind, so that none hides another. */
-function drawMarks({ ctx, bbox, valToPos }: uPlot, marks: PlotMark[]): void {
+function drawMarks({ ctx, bbox, valToPos }: uPlot, marks: readonly PlotMark[]): void {
   const [foot, lane] = [bbox.top + bbox.height, MARK_LANE * devicePixelRatio];
   ctx.save();
   ctx.font = `${10 * devicePixelRatio}px system-ui, sans-serif`;
