@@ -155,6 +155,8 @@ describe('the computed ventricle', () => {
     await expect.poll(shown).not.toBe(5);
     await app.page.click('[data-frame=beat]');
     await expect.poll(() => text('[data-frame=beat]')).toBe('Loop');
+    // The progress stays full while other frames are shown.
+    expect(await app.page.locator('.transport progress').getAttribute('value')).toBe('1');
   });
 
   test('has votes on its surface and pictures below', async () => {

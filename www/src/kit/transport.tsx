@@ -1,5 +1,4 @@
 import { signal } from '@preact/signals';
-import { useLayoutEffect, useRef } from 'preact/hooks';
 import type { StepReport } from '../engine/protocol';
 import { text } from '../texts';
 import { prefersReducedMotion } from './dom';
@@ -73,21 +72,20 @@ export function Transport({ run, events }: { run: RunState; events: TransportEve
 function Progress({ run }: { run: RunState }) {
   const { lab } = run.state.value;
   const report = run.report.value;
-  const bar = useRef<HTMLProgressElement>(null);
   const share = report && Number.isFinite(report.progress) ? report.progress : 0;
-  useLayoutEffect(() => {
-    if (!bar.current) return;
-    // A progress bar without a value is animated: the duration is unknown.
-    if (lab === 'loading' && !prefersReducedMotion()) bar.current.removeAttribute('value');
-    else bar.current.value = lab === 'done' ? 1 : share;
-  }, [lab, share]);
+  // A progress bar without a value is animated: the duration is unknown.
+  const isAnimated = lab === 'loading' && !prefersReducedMotion();
   return (
     <>
       <div class="where">
         <span class="iteration">{text('controls.iteration', { number: count(report?.iteration ?? 0) })}</span>
         <span class="phase">{report?.phase}</span>
       </div>
-      <progress max={1} aria-label={text('controls.progress')} ref={bar} />
+      <progress
+        max={1}
+        value={isAnimated ? undefined : lab === 'done' ? 1 : share}
+        aria-label={text('controls.progress')}
+      />
     </>
   );
 }

@@ -60,17 +60,12 @@ export function PhaseList({ phases }: { phases: ReadonlySignal<readonly Phase[]>
         >
           <span>{label}</span>
           <span class="time">{spent === undefined ? '' : milliseconds(spent)}</span>
-          <Bar label={label} progress={progress} />
+          {/* Without a value it is animated. */}
+          <progress max={1} aria-label={label} value={progress} />
         </li>
       ))}
     </ol>
   );
-}
-
-/** A progress bar; one without a value is animated. */
-function Bar({ label, progress }: { label: string; progress: number | undefined }) {
-  if (progress === undefined) return <progress key="unknown" max={1} aria-label={label} />;
-  return <progress key="known" max={1} aria-label={label} value={progress} />;
 }
 
 /**
