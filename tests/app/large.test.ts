@@ -2,7 +2,7 @@
 import { readFile } from 'node:fs/promises';
 import { afterAll, afterEach, beforeAll, expect, test } from 'vitest';
 import { at } from '../../scripts/shell.mjs';
-import { addressProblem } from '../../www/src/labs/extract/panels/large-source';
+import { addressProblem } from '../../www/src/labs/extract/large-address';
 import { filesOf, serveImage } from '../js/zarr-stores';
 import { type App, drop, measures, open, openApp, QUICK, reach, recordStates, unfold } from './browser';
 import { LONG } from './long';

@@ -3,6 +3,7 @@ import type { StepReport } from '../engine/protocol';
 import { text } from '../texts';
 import { count, figure } from './format';
 import type { Curve } from './plots';
+import { Scrolling } from './ui/parts';
 
 /** Largest number of iterations listed in the table: few enough to be read, or listened to. */
 const ROWS = 12;
@@ -25,8 +26,7 @@ export function PlotTable({ curves, run }: TableProps) {
       }}
     >
       <summary>{text('measures.plotTableSummary')}</summary>
-      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: it scrolls, also by keyboard. */}
-      <section class="scroll" tabIndex={0} aria-label={text('measures.plotTable')}>
+      <Scrolling label={text('measures.plotTable')}>
         <table class="times" data-plot-table="">
           <thead>
             <tr>
@@ -39,7 +39,7 @@ export function PlotTable({ curves, run }: TableProps) {
           </thead>
           {isOpen.value && <Rows {...{ curves, run }} />}
         </table>
-      </section>
+      </Scrolling>
     </details>
   );
 }

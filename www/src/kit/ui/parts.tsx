@@ -50,6 +50,16 @@ export function Help({ children }: { children: ComponentChildren }) {
   return <p class="help">{children}</p>;
 }
 
+/** A part that scrolls, also by keyboard, such as a wide table. */
+export function Scrolling({ label, children }: { label: string; children: ComponentChildren }) {
+  return (
+    // biome-ignore lint/a11y/noNoninteractiveTabindex: else it could not be scrolled by keyboard.
+    <section class="scroll" tabIndex={0} aria-label={label}>
+      {children}
+    </section>
+  );
+}
+
 /** Why something that was entered is refused; empty if nothing is. */
 export function Refusal({ children }: { children: ComponentChildren }) {
   return (

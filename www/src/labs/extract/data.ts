@@ -15,13 +15,13 @@ import { text } from '../../texts';
 import type { ExtractClient } from './client';
 import { EXAMPLES, type Example } from './examples';
 import { fromHash, type Linked, withLink } from './link';
-import { type StartChoice, USUAL_START } from './panels/start';
 import type { ExtractParts } from './parts';
 import { defaultStart, exampleById } from './presets';
 import type { ImageSource, Loaded, Setup } from './protocol';
 import type { ExtractResults } from './results';
 import type { ExtractContent } from './schema';
 import type { ExtractMoments, ExtractSettings } from './settings';
+import { type StartChoice, USUAL_START } from './start';
 import { EXTRACT_VIEW } from './view';
 
 export type ExtractSource = Source<Example, Linked, ImageSource>;
@@ -223,7 +223,7 @@ export class ExtractData implements LabData<Example, Linked, ImageSource, Opened
    * a link the usual one. A link's settings take precedence.
    */
   #startFor({ example, linked }: ExtractSource, volume: ImageSource): StartChoice {
-    const choice = this.#ui.start.value;
+    const choice = this.#ui.start.shown.peek();
     const own: StartChoice =
       'zarr' in volume
         ? { ...choice, kind: 'contour', levels: 1, edge: undefined, box: undefined }

@@ -165,10 +165,10 @@ class ExtractLab implements RunningLab<Example> {
   async #compare(): Promise<void> {
     if (!this.states.canChange) return;
     const { compare, start } = this.ui;
-    if (start.value.levels === 0) return compare.reject(text('extract.compareNeedsLevel'));
+    if (start.shown.peek().levels === 0) return compare.reject(text('extract.compareNeedsLevel'));
     compare.begin();
     try {
-      const setup = this.#settings.setup(start.value, this.#settings.params, []);
+      const setup = this.#settings.setup(start.shown.peek(), this.#settings.params, []);
       compare.finish(await this.client.request('compare', setup));
     } catch (error) {
       compare.reject(text('extract.compareFailed', { message: toFailure(error).message }));

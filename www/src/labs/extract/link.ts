@@ -5,8 +5,8 @@ import { initialOptions } from '../../kit/view';
 import { as, integer, linkFormat, many, name, numbers, oneOfChoices, real } from '../../lab/link-fields';
 import { differing } from '../../lab/link-query';
 import { EXAMPLES, type Example } from './examples';
-import { SHAPES, type StartChoice } from './panels/start';
 import { defaultStart, exampleById, isPreset, PAPER } from './presets';
+import { SHAPES, type StartChoice } from './start';
 import { EXTRACT_VIEW, type ExtractViewOptions } from './view';
 
 export const ADDRESS = '#extract';

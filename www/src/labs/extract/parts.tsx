@@ -2,7 +2,6 @@ import { type ReadonlySignal, signal } from '@preact/signals';
 import type { Attractor, ParamValues, Plane, VolumeView } from '../../engine/protocol';
 import { FileChooser } from '../../importers/chooser';
 import { h } from '../../kit/dom';
-import { COVERAGE_GUIDE } from '../../kit/guides';
 import type { History } from '../../kit/history';
 import { MeasureTable, SurfaceMeasures } from '../../kit/measures';
 import { ENERGY_PLOTS, Plots, RunPlots } from '../../kit/plots';
@@ -23,16 +22,16 @@ import type { ExtractClient } from './client';
 import { type ExtractSource, frameOf } from './data';
 import type { Example } from './examples';
 import { extractData, factsOf } from './page';
-import { AttractorControls } from './panels/attractors';
-import { ComparePanel } from './panels/compare';
-import { CoveragePanel } from './panels/coverage';
+import { AttractorControls, Attractors } from './panels/attractors';
+import { ComparePanel, Comparison } from './panels/compare';
+import { Coverage, CoveragePanel } from './panels/coverage';
 import { FrameChoice } from './panels/frame-choice';
-import { Histogram } from './panels/histogram';
+import { Histogram, IsoState } from './panels/histogram';
 import { LabelsOffer } from './panels/labels-offer';
-import { LargeSourceControls } from './panels/large-source';
-import { EventLog } from './panels/log';
-import { PyramidPanel } from './panels/pyramid';
-import { StartControls } from './panels/start';
+import { LargeReading, LargeSourceControls } from './panels/large-source';
+import { EventList, EventLog } from './panels/log';
+import { Pyramid, PyramidPanel } from './panels/pyramid';
+import { StartControls, StartState } from './panels/start';
 import { TimeTable } from './panels/times';
 import { isPreset, type Preset, type Variant, variantInForce } from './presets';
 import type { LargeSource } from './protocol';
@@ -60,34 +59,38 @@ export class ExtractParts {
   readonly page: LabPage<Example>;
   readonly run: RunControls;
 
-  readonly #labels: LabelsOffer;
+  /** Number of labels if the volume looks like a label map. */
+  readonly #labels = signal(0);
   readonly #slices = h('div', { class: 'slices' });
   readonly stage: Stage;
   readonly measures = new SurfaceMeasures();
-  readonly large: LargeSourceControls;
+  readonly large = new LargeReading();
   /** Number of frames of the open volume. */
   #frameCount = 1;
-  readonly #frames: FrameChoice;
-  readonly histogram: Histogram;
-  readonly start: StartControls;
-  readonly pyramid: PyramidPanel;
-  readonly attractors: AttractorControls;
+  readonly #frame = signal({ frame: 0, frames: 1 });
+  readonly #iso: IsoState;
+  readonly start: StartState;
+  readonly pyramid: Pyramid;
+  readonly attractors: Attractors;
   readonly options: ViewOptions<typeof EXTRACT_VIEW>;
-  readonly compare: ComparePanel;
-  readonly coverage: CoveragePanel;
+  readonly compare = new Comparison();
+  readonly coverage: Coverage;
   readonly #figure = signal<{ preset: Preset | undefined; variant: Variant | undefined }>({
     ...{ preset: undefined, variant: undefined },
   });
   readonly #isReady = signal(false);
   readonly #plots: Plots;
-  readonly #times = new TimeTable();
+  readonly #times = signal<Pick<History, 'times'>>({ times: new Map() });
   readonly #log = new EventLog();
   readonly #isComparing = signal(false);
 
   constructor(root: HTMLElement, history: History, client: ExtractClient, signal: AbortSignal, events: PartEvents) {
-    const large = new LargeSourceControls(events.onLarge);
-    const frames = new FrameChoice(events.onFrame);
-    const more = [frames, large].map(({ element }, index) => <Made key={index} of={element} />);
+    const more = (
+      <>
+        <FrameChoice open={this.#frame} onFrame={events.onFrame} />
+        <LargeSourceControls reading={this.large} onOpen={events.onLarge} />
+      </>
+    );
     this.page = new LabPage(root, signal, events, {
       viewLabel: text('extract.viewLabel'),
       drop: text('extract.drop'),
@@ -100,18 +103,15 @@ export class ExtractParts {
       history,
       fetchMesh: (request) => client.request('export', request),
     });
-    this.large = large;
-    this.#frames = frames;
-    this.#labels = new LabelsOffer(events.onSegment);
     this.stage = new Stage(this.page.canvas, this.#slices, initialOptions(EXTRACT_VIEW), events.onPlanes);
-    this.histogram = new Histogram((iso) => events.onParam('iso', iso));
-    this.start = new StartControls(events.onStart);
-    this.pyramid = new PyramidPanel(
+    this.#iso = new IsoState((iso) => events.onParam('iso', iso));
+    this.start = new StartState(events.onStart);
+    this.pyramid = new Pyramid(
       (level) => this.stage.thumbnail(level),
       (level) => this.stage.showLevel(level),
     );
     this.stage.onMoved = () => this.pyramid.redraw();
-    this.attractors = new AttractorControls({
+    this.attractors = new Attractors({
       onChange: events.onAttractors,
       onPlacing: (placing) => this.#setPlacing(placing),
       onGoTo: (point) => this.stage.goTo(point),
@@ -121,8 +121,7 @@ export class ExtractParts {
       this.stage.setOptions(options);
       events.onOptions(options);
     });
-    this.compare = new ComparePanel({ onStart: events.onCompare, onCancel: events.onCancelCompare });
-    this.coverage = new CoveragePanel(COVERAGE_GUIDE, {
+    this.coverage = new Coverage({
       onStart: events.onCoverage,
       onCancel: events.onCancelCoverage,
       onSeed: events.onSeed,
@@ -134,7 +133,12 @@ export class ExtractParts {
     this.page.layOut({
       name: 'extract',
       options: <OptionControls of={this.options} />,
-      over: made([this.stage.legend, this.stage.editing.legend]),
+      over: (
+        <>
+          <Made of={this.stage.legend.element} />
+          <Made of={this.stage.editing.legend.element} />
+        </>
+      ),
       stage: (view, status) => (
         <>
           {view}
@@ -147,13 +151,21 @@ export class ExtractParts {
         <>
           <Section title={text('extract.sectionData')}>
             <DataPanel data={this.page.data} />
-            {made([this.#labels])}
+            <LabelsOffer labels={this.#labels} onSegment={events.onSegment} />
             <FigureOf shown={this.#figure} onVariant={events.onVariant} />
           </Section>
-          <Section title={text('extract.sectionIntensities')}>{made([this.histogram])}</Section>
-          <Section title={text('extract.sectionStart')}>{made([this.start])}</Section>
-          <Section title={text('extract.sectionPyramid')}>{made([this.pyramid])}</Section>
-          <Section title={text('extract.sectionAttractors')}>{made([this.attractors])}</Section>
+          <Section title={text('extract.sectionIntensities')}>
+            <Histogram state={this.#iso} />
+          </Section>
+          <Section title={text('extract.sectionStart')}>
+            <StartControls state={this.start} />
+          </Section>
+          <Section title={text('extract.sectionPyramid')}>
+            <PyramidPanel pyramid={this.pyramid} />
+          </Section>
+          <Section title={text('extract.sectionAttractors')}>
+            <AttractorControls of={this.attractors} />
+          </Section>
           {this.page.paramsSection(true)}
         </>
       ),
@@ -163,17 +175,23 @@ export class ExtractParts {
             <WarningList warnings={this.page.warnings} />
             <MeasureTable measures={this.measures} />
           </Section>
-          <Section title={text('extract.sectionCoverage')}>{made([this.coverage])}</Section>
+          <Section title={text('extract.sectionCoverage')}>
+            <CoveragePanel of={this.coverage} />
+          </Section>
           {this.run.saveSection(this.stage.subject, <ToSculpt isReady={this.#isReady} onSculpt={events.onSculpt} />)}
           {this.run.finishSections(this.stage.editing, this.measures)}
           <Section title={text('labs.sectionProgress')}>
             <RunPlots plots={this.#plots} />
             {this.run.plotData}
           </Section>
-          <Section title={text('extract.sectionEvents')}>{made([this.#log])}</Section>
-          <Section title={text('extract.sectionTimes')}>{made([this.#times])}</Section>
+          <Section title={text('extract.sectionEvents')}>
+            <EventList log={this.#log} />
+          </Section>
+          <Section title={text('extract.sectionTimes')}>
+            <TimeTable run={this.#times} />
+          </Section>
           <Folded title={text('extract.sectionCompare')} isOpen={this.#isComparing}>
-            {made([this.compare])}
+            <ComparePanel of={this.compare} onStart={events.onCompare} onCancel={events.onCancelCompare} />
           </Folded>
         </>
       ),
@@ -183,7 +201,7 @@ export class ExtractParts {
   /** Shows a newly opened volume, and clears results of the previous one. */
   adopt(volume: VolumeView, source: ExtractSource, labels: number): void {
     const { example, unit = unitOf(volume) } = source;
-    this.#labels.show(example ? 0 : labels);
+    this.#labels.value = example ? 0 : labels;
     this.page.saving.name = volume.name;
     this.page.warnings.showData(source.warnings, volume.warnings);
     const shown = example?.unit ?? unit;
@@ -191,12 +209,12 @@ export class ExtractParts {
     this.stage.unit = shown;
     this.run.unit = shown;
     this.run.surfaceSpace = spaceOf(volume, shown);
-    this.histogram.setVolume(volume);
+    this.#iso.volume.value = volume;
     this.page.data.show(factsOf(volume, shown), example);
     this.#frameCount = volume.frames;
     this.showFrame(source);
     this.large.showTotal(volume.large?.bytes);
-    this.start.isLarge = volume.large !== undefined;
+    this.start.isLarge.value = volume.large !== undefined;
     this.stage.setVolume(volume);
     this.compare.clear();
     this.coverage.unit = this.stage.unit;
@@ -205,18 +223,18 @@ export class ExtractParts {
   }
 
   showFrame(source: ExtractSource): void {
-    this.#frames.show(frameOf(source), this.#frameCount);
+    this.#frame.value = { frame: frameOf(source), frames: this.#frameCount };
   }
 
   showParams(params: ParamValues, example: Example | undefined): void {
     this.page.showParams(params);
-    if (typeof params.iso === 'number') this.histogram.setIso(params.iso);
+    if (typeof params.iso === 'number') this.#iso.setIso(params.iso);
     const preset = isPreset(example) ? example : undefined;
     this.#figure.value = { preset, variant: preset && variantInForce(preset, params) };
   }
 
   refuseParam(name: string, message: string): void {
-    if (name === 'iso') this.histogram.showError(message);
+    if (name === 'iso') this.#iso.showError(message);
     else this.page.refuseParam(name, message);
   }
 
@@ -229,7 +247,7 @@ export class ExtractParts {
   showHistory(): void {
     this.run.showWarnings();
     this.#plots.update();
-    this.#times.update(this.run.history);
+    this.#times.value = { times: this.run.history.times };
     this.run.hasPlots.value = this.run.history.reports.length > 0;
     this.#log.update(this.run.history);
   }
@@ -244,8 +262,8 @@ export class ExtractParts {
   showState(state: LabState, beneath: LabState, ready: boolean): void {
     const idle = this.run.showState(state, beneath, ready);
     this.#isReady.value = idle;
-    this.compare.enabled = idle;
-    this.coverage.enabled = idle;
+    this.compare.isEnabled.value = idle;
+    this.coverage.isEnabled.value = idle;
   }
 
   dispose(): void {
@@ -259,8 +277,6 @@ export class ExtractParts {
     this.page.status.say(placing ? text('extract.placeAttractors') : '');
   }
 }
-
-const made = (all: { element: HTMLElement }[]) => all.map(({ element }, index) => <Made key={index} of={element} />);
 
 function ToSculpt({ isReady, onSculpt }: { isReady: ReadonlySignal<boolean>; onSculpt: () => void }) {
   return (

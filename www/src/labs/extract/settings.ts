@@ -6,11 +6,11 @@ import type { LabStates } from '../../lab/states';
 import { type SavedMoment, UndoHistory } from '../../lab/undo-history';
 import { plural, text } from '../../texts';
 import type { ExtractClient } from './client';
-import type { StartChoice } from './panels/start';
 import type { ExtractParts } from './parts';
 import type { Preset, Variant } from './presets';
 import type { SavedRun, Setup, StartShape } from './protocol';
 import type { ExtractResults } from './results';
+import type { StartChoice } from './start';
 
 /**
  * Radius of the sphere around the crosshair that the user can choose as initial surface, as a fraction of the volume's
@@ -219,7 +219,7 @@ export class ExtractSettings {
       const running = this.#states.value === 'running';
       const forget = this.checkpoint(text('extract.startChange'));
       try {
-        await this.#rebuild(this.#ui.start.value, this.#params);
+        await this.#rebuild(this.#ui.start.shown.peek(), this.#params);
         await this.#client.request('play', undefined);
       } catch (error) {
         forget();
