@@ -36,14 +36,28 @@ interface FieldProps {
   isRow?: boolean;
   hidden?: boolean;
   title?: string;
+  class?: string;
   /** Elements below the control, such as a slider. */
   below?: ComponentChildren;
+  /** Elements below the help and the error message. */
+  after?: ComponentChildren;
   children: (tied: Tied) => JSX.Element;
   [data: `data-${string}`]: string | undefined;
 }
 
 /** A form control with its label, symbol, unit, help and error message. */
-export function Field({ label, symbol, unit, help, error = '', isRow = false, below, children, ...rest }: FieldProps) {
+export function Field({
+  label,
+  symbol,
+  unit,
+  help,
+  error = '',
+  isRow = false,
+  below,
+  after,
+  children,
+  ...rest
+}: FieldProps) {
   const id = useId();
   const described = [help !== undefined && `${id}-help`, `${id}-error`].filter(Boolean).join(' ');
   const labelled = (
@@ -78,6 +92,7 @@ export function Field({ label, symbol, unit, help, error = '', isRow = false, be
       <p class="field-error" id={`${id}-error`} role="alert">
         {error}
       </p>
+      {after}
     </div>
   );
 }

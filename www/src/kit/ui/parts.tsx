@@ -50,11 +50,18 @@ export function Help({ children }: { children: ComponentChildren }) {
   return <p class="help">{children}</p>;
 }
 
+interface ScrollingProps {
+  label: string;
+  /** Whether it also scrolls vertically. */
+  isTall?: boolean;
+  children: ComponentChildren;
+}
+
 /** A part that scrolls, also by keyboard, such as a wide table. */
-export function Scrolling({ label, children }: { label: string; children: ComponentChildren }) {
+export function Scrolling({ label, isTall = false, children }: ScrollingProps) {
   return (
     // biome-ignore lint/a11y/noNoninteractiveTabindex: else it could not be scrolled by keyboard.
-    <section class="scroll" tabIndex={0} aria-label={label}>
+    <section class={isTall ? 'scroll tall' : 'scroll'} tabIndex={0} aria-label={label}>
       {children}
     </section>
   );

@@ -47,7 +47,7 @@ export class TrackAsking {
 
   /** Whether the lab asks for the object. */
   get isOpen(): boolean {
-    return this.#ui.object.open;
+    return this.#ui.object.isOpen.peek();
   }
 
   /** The box that was drawn to find an object in it, not in force yet. */
@@ -59,31 +59,29 @@ export class TrackAsking {
     const { object, options, view } = this.#ui;
     view.onPick = (point) => void this.propose({ point, frame: this.#ui.frames.frame });
     options.set({ ...options.value, below: 'slices', region: true });
-    object.open = true;
+    object.open();
     this.#toggled();
-    // On a narrow page it is below the view.
-    object.element.scrollIntoView({ block: 'nearest' });
   }
 
   end(): void {
     this.#ui.view.onPick = undefined;
-    this.#ui.object.open = false;
+    this.#ui.object.close();
     this.#toggled();
   }
 
   #toggled(): void {
     this.#box = undefined;
     this.#settings.runs = !this.isOpen;
-    this.#ui.region.asks = this.isOpen;
-    this.#ui.object.hasBox = this.#settings.setup.box !== undefined;
-    this.#ui.object.hasOther = isChosen(this.#settings.setup) || this.#settings.wasRun;
+    this.#ui.region.asks.value = this.isOpen;
+    this.#ui.object.hasBox.value = this.#settings.setup.box !== undefined;
+    this.#ui.object.hasOther.value = isChosen(this.#settings.setup) || this.#settings.wasRun;
     this.#events.onToggle();
   }
 
   /** Takes over a box that was drawn, to find an object in it; undefined is the whole image. */
   draw(region: VoxelBox | undefined, affine: ArrayLike<number>): void {
     this.#box = region && boxOf(region, affine);
-    this.#ui.object.hasBox = region !== undefined;
+    this.#ui.object.hasBox.value = region !== undefined;
     this.#events.onToggle();
   }
 
@@ -127,7 +125,7 @@ export class TrackAsking {
     let found: Proposal | undefined;
     await this.#states.enqueue(async () => {
       if (!this.#states.canChange) return;
-      this.#ui.object.showRefusal('');
+      this.#ui.object.refusal.value = '';
       this.#states.load(text('track.proposing'));
       this.#settings.runs = true;
       try {
@@ -163,7 +161,7 @@ export class TrackAsking {
     if (code === 'internal') this.#states.fail(refused, error);
     else {
       this.#states.restore(() => refused);
-      this.#ui.object.showRefusal(`${refused} ${adviceFor(query)} ${text('track.refusal', { message })}`);
+      this.#ui.object.refusal.value = `${refused} ${adviceFor(query)} ${text('track.refusal', { message })}`;
     }
   }
 }

@@ -1,4 +1,5 @@
 /** The paper's figures of one slice, or of one line through time, side by side under the view of the Track lab. */
+import { signal } from '@preact/signals';
 import type { Vec3, VolumeView } from '../../engine/protocol';
 import { context2d, h, token } from '../../kit/dom';
 import { invert, sliceOrientations } from '../../scene/anatomy';
@@ -15,17 +16,11 @@ const IMAGE_SIZE = 560;
 
 /** An image with a caption, as one of the pictures of a figure. */
 export class FigureImage {
-  readonly element: HTMLElement;
   readonly canvas: HTMLCanvasElement;
-  readonly #caption = h('figcaption');
+  readonly caption = signal('');
 
   constructor(label: string) {
     this.canvas = h('canvas', { role: 'img', 'aria-label': label });
-    this.element = h('figure', { class: 'still' }, this.canvas, this.#caption);
-  }
-
-  set caption(text: string) {
-    if (this.#caption.textContent !== text) this.#caption.textContent = text;
   }
 
   /**

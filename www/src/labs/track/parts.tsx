@@ -21,17 +21,17 @@ import type { TrackClient } from './client';
 import type { TrackExample } from './examples';
 import { TRACK_ROWS } from './measures';
 import { factsOf, imageData } from './page';
-import { TrackComparePanel } from './panels/compare';
-import { EdgeThreshold } from './panels/edge-threshold';
-import { FigureRow } from './panels/figure-row';
-import { FrameBar } from './panels/frame-bar';
-import { FrameTable } from './panels/frame-table';
-import { ObjectChoice, type ObjectEvents } from './panels/object-choice';
-import { PreparationControls } from './panels/preparation';
-import { RegionControls, type RegionEvents } from './panels/region';
+import { ComparePanel, TrackComparison } from './panels/compare';
+import { EdgeThreshold, ThresholdState } from './panels/edge-threshold';
+import { FigureRow, Stills } from './panels/figure-row';
+import { FrameBar, Frames } from './panels/frame-bar';
+import { FrameTable, FrameWarnings, NO_FRAMES } from './panels/frame-table';
+import { ObjectChoice, type ObjectEvents, ObjectQuestion } from './panels/object-choice';
+import { PreparationControls, PreparationState } from './panels/preparation';
+import { RegionControls, type RegionEvents, RegionState } from './panels/region';
 import { NO_VOLUMES, VolumeCurve, type VolumeCurves } from './panels/volume-curve';
 import type { TrackPreset, TrackVariant } from './presets';
-import type { Alternative, OpenedImage, ParamSpec, ParamValues, Preparation, Vec3 } from './protocol';
+import type { Alternative, OpenedImage, ParamValues, Preparation, Vec3 } from './protocol';
 import { TrackView } from './scene';
 import { TRACK_VIEW, type TrackViewOptions } from './view';
 
@@ -55,25 +55,23 @@ export class TrackParts {
   readonly #slices = h('div', { class: 'slices' });
   readonly view: TrackView;
   readonly measures = new SurfaceMeasures();
-  readonly table = new FrameTable();
+  readonly table = signal(NO_FRAMES);
   readonly options: ViewOptions<typeof TRACK_VIEW>;
-  readonly preparation: PreparationControls;
-  readonly region: RegionControls;
-  readonly object: ObjectChoice;
-  readonly frames: FrameBar;
+  readonly preparation = new PreparationState();
+  readonly region = new RegionState();
+  readonly object = new ObjectQuestion();
+  readonly frames: Frames;
   readonly #curves = signal(NO_VOLUMES);
   #nextCurves = NO_VOLUMES;
   #curvesPending = 0;
-  readonly stills: FigureRow;
-  readonly compare: TrackComparePanel;
-  readonly #onParam: PartEvents['onParam'];
+  readonly stills: Stills;
+  readonly compare = new TrackComparison();
   readonly #figure = signal<{ preset: TrackPreset | undefined; variant: TrackVariant | undefined }>({
     ...{ preset: undefined, variant: undefined },
   });
   /** What can be saved: all frames, and the surface of the one shown. */
   readonly #saves = signal({ all: false, here: false });
-  readonly #thresholdHolder = h('div', { class: 'made' });
-  #threshold: EdgeThreshold | undefined;
+  readonly #threshold = new ThresholdState();
   /**
    * Half width k, in voxels, of the windows in which the tracker finds the boundary; the preview of an edge threshold
    * uses it.
@@ -87,7 +85,9 @@ export class TrackParts {
       admission: 'frames',
       data: imageData(<FileChooser onFiles={events.onFiles} admission="frames" />, events.onExample),
       ownControls: ['threshold'],
-      onParams: (specs) => this.#makeThreshold(specs),
+      onParams: (specs) => {
+        this.#threshold.spec.value = specs.find(({ name }) => name === 'threshold');
+      },
     });
     this.run = new RunControls(this.page, events, {
       history,
@@ -96,25 +96,20 @@ export class TrackParts {
       concerningSurface: (warnings) => concerning(warnings, { frame: this.frames.frame }),
     });
     this.view = new TrackView(this.page.canvas, this.#slices, initialOptions(TRACK_VIEW));
-    this.#onParam = events.onParam;
-    this.preparation = new PreparationControls(events.onPreparation);
-    this.region = new RegionControls(events);
-    this.object = new ObjectChoice(events);
     this.#slices.addEventListener('keydown', (event) => {
       if (event.key === 'Enter' && event.target instanceof HTMLInputElement && event.target.type === 'range')
         events.onHere();
     });
-    this.frames = new FrameBar(events.onFrame);
+    this.frames = new Frames(events.onFrame);
     const stopAt = (frame: number) => {
       this.frames.stop();
       events.onFrame(frame);
     };
-    this.stills = new FigureRow((voxel: Vec3) => this.view.goToVoxel(voxel), stopAt);
-    this.compare = new TrackComparePanel({ onStart: events.onCompare, onCancel: events.onCancelCompare });
+    this.stills = new Stills((voxel: Vec3) => this.view.goToVoxel(voxel), stopAt);
     this.options = new ViewOptions(TRACK_VIEW, (options) => {
       this.view.setOptions(options);
       this.#slices.hidden = options.below !== 'slices';
-      this.stills.below = options.below;
+      this.stills.choose(options.below);
       events.onOptions(options);
     });
     this.view.onRegion = (region: VoxelBox) => events.onRegion(region);
@@ -127,12 +122,12 @@ export class TrackParts {
       stage: (view, status) => (
         <>
           {view}
-          {made([this.frames])}
+          <FrameBar of={this.frames} />
           {this.run.controls}
           {status}
-          {made([this.object])}
+          <ObjectChoice of={this.object} events={events} />
           <Made of={this.#slices} />
-          {made([this.stills])}
+          <FigureRow of={this.stills} />
         </>
       ),
       setup: (
@@ -142,10 +137,18 @@ export class TrackParts {
             <FigureOf shown={this.#figure} onVariant={events.onVariant} />
           </Section>
           <Section title={text('track.sectionBoundary')}>
-            <Made of={this.#thresholdHolder} />
+            <EdgeThreshold
+              state={this.#threshold}
+              onChange={(value) => events.onParam('threshold', value)}
+              onTry={(value) => this.view.preview(value, this.#window)}
+            />
           </Section>
-          <Section title={text('track.sectionRegion')}>{made([this.region])}</Section>
-          <Folded title={text('track.sectionPreparation')}>{made([this.preparation])}</Folded>
+          <Section title={text('track.sectionRegion')}>
+            <RegionControls state={this.region} events={events} />
+          </Section>
+          <Folded title={text('track.sectionPreparation')}>
+            <PreparationControls state={this.preparation} onChange={events.onPreparation} />
+          </Folded>
           {this.page.paramsSection()}
         </>
       ),
@@ -153,7 +156,7 @@ export class TrackParts {
         <>
           <Section title={text('track.sectionCurve')}>
             <VolumeCurve curves={this.#curves} onFrame={stopAt} />
-            <Made of={this.table.warnings} />
+            <FrameWarnings shown={this.table} />
           </Section>
           <Section title={text('track.sectionSurface')}>
             <WarningList warnings={this.page.warnings} />
@@ -161,22 +164,15 @@ export class TrackParts {
           </Section>
           {this.run.saveSection(this.view.subject, <Saves can={this.#saves} events={events} />)}
           {this.run.finishSections(this.view.editing, this.measures, () => this.frames.stop())}
-          <Folded title={text('labs.frames')}>{made([this.table])}</Folded>
-          <Folded title={text('track.sectionCompare')}>{made([this.compare])}</Folded>
+          <Folded title={text('labs.frames')}>
+            <FrameTable shown={this.table} />
+          </Folded>
+          <Folded title={text('track.sectionCompare')}>
+            <ComparePanel of={this.compare} onStart={events.onCompare} onCancel={events.onCancelCompare} />
+          </Folded>
         </>
       ),
     });
-  }
-
-  #makeThreshold(specs: ParamSpec[]): void {
-    const threshold = specs.find(({ name }) => name === 'threshold');
-    if (!threshold || this.#threshold) return;
-    this.#threshold = new EdgeThreshold(
-      threshold,
-      (value) => this.#onParam('threshold', value),
-      (value) => this.view.preview(value, this.#window),
-    );
-    this.#thresholdHolder.replaceChildren(this.#threshold.element);
   }
 
   /** Shows the facts about a newly opened image. */
@@ -192,7 +188,7 @@ export class TrackParts {
   showParams(params: ParamValues, noise: number, suggested: number, most: number): void {
     this.#window = Number(params.window);
     this.page.showParams(params);
-    this.#threshold?.show(Number(params.threshold), noise, suggested, most);
+    this.#threshold.show({ threshold: Number(params.threshold), noise, suggested, largest: most });
   }
 
   showFigure(preset: TrackPreset | undefined, variant: TrackVariant | undefined): void {
@@ -200,7 +196,7 @@ export class TrackParts {
   }
 
   refuseParam(name: string, message: string): void {
-    if (name === 'threshold') this.#threshold?.showError(message);
+    if (name === 'threshold') this.#threshold.showError(message);
     else this.page.refuseParam(name, message);
   }
 
@@ -213,10 +209,10 @@ export class TrackParts {
     this.run.exports.enabled = idle && here;
     this.#saves.value = { all: idle && tracked > 0, here: idle && here };
     // While the lab asks for the object, there is nothing to run.
-    if (this.object.open) this.run.transport.showState(beneath, false);
-    this.object.enabled = idle;
-    this.region.enabled = idle;
-    this.compare.enabled = idle && beneath === 'done';
+    if (this.object.isOpen.peek()) this.run.transport.showState(beneath, false);
+    this.object.isEnabled.value = idle;
+    this.region.isEnabled.value = idle;
+    this.compare.isEnabled.value = idle && beneath === 'done';
   }
 
   /** Shows volume curves at the next animation frame. */
@@ -255,5 +251,3 @@ function Saves({ can, events }: { can: ReadonlySignal<{ all: boolean; here: bool
     </>
   );
 }
-
-const made = (all: { element: HTMLElement }[]) => all.map(({ element }, index) => <Made key={index} of={element} />);

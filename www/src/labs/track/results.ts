@@ -187,12 +187,10 @@ export class TrackResults {
     this.#ui.page.warnings.showReport(last);
     const { value, modelState, ready } = this.#states;
     this.#ui.showState(value, modelState, ready, this.#frames.length, tracked !== undefined);
-    this.#root.dataset.frame = String(this.#frame + 1);
   }
 
   /** Shows the curve of the volume enclosed in each frame, and the table of frames. */
   showCurve(): void {
-    const { table } = this.#ui;
     const frames = this.#image?.volume.frames ?? 1;
     const facts = this.#frames.map((one) => one.facts);
     const volumes = facts.map(({ volume }) => volume);
@@ -205,7 +203,7 @@ export class TrackResults {
       unit: this.#unit,
     });
     const errors = this.#frames.map(({ error }) => error);
-    table.show(facts, errors, this.#frame);
+    this.#ui.table.value = { facts, errors, frame: this.#frame };
   }
 
   /** Unit of lengths of the image, for the volume curve. */
@@ -258,10 +256,6 @@ export class TrackResults {
     const beat = beatOf(this.#frames.map(({ facts }) => facts.volume));
     if (!beat) return text('track.done', { frames: count });
     return text('track.doneCycle', { frames: count, ejection: (100 * beat.ejection).toFixed(1) });
-  }
-
-  get #root(): HTMLElement {
-    return this.#ui.frames.element;
   }
 
   /** Returns the index of the slice of the unprepared image that is nearest to the crosshair and has two neighbours. */
