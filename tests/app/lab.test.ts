@@ -104,6 +104,16 @@ describe('a figure of the paper', () => {
       expect(Math.abs((forces[i] ?? 0) + (motion[i] ?? 0) - sum)).toBeLessThan(0.02);
   });
 
+  test('by keyboard, coverage is measured and cancelled; the focus goes to Cancel and back', async () => {
+    const start = app.page.locator('[data-coverage-action=start]');
+    const focused = () => app.page.evaluate(() => (document.activeElement as HTMLElement).dataset.coverageAction);
+    await start.press('Enter');
+    await expect.poll(focused).toBe('cancel');
+    await app.page.keyboard.press('Enter');
+    await expect.poll(() => text('.coverage [role=status]')).toBe('Cancelled.');
+    await expect.poll(focused).toBe('start');
+  });
+
   test('compares direct with coarse to fine in a table, and keeps the surface', LONG, async () => {
     await openAt('#extract?example=figure-15-16&v=2');
     const before = await measures(app.page);
