@@ -31,42 +31,6 @@ export function context2d(canvas: HTMLCanvasElement): CanvasRenderingContext2D |
   return canvas.getContext('2d', { willReadFrequently: true });
 }
 
-/** Creates a section with a heading, for a column of a lab's page. */
-export function section(title: string, ...children: (Node | string)[]): HTMLElement {
-  return h('section', { class: 'panel' }, h('h2', {}, title), ...children);
-}
-
-/** Creates a titled section for a column of a lab's page that is collapsed until the user opens it. */
-export function folded(title: string, ...children: Node[]): HTMLDetailsElement {
-  return h('details', { class: 'panel' }, h('summary', {}, h('h2', {}, title)), ...children);
-}
-
-/** Creates a button as wide as its column; `action` identifies it in the page. */
-export function wideButton(text: string, action: string, onclick: () => void): HTMLButtonElement {
-  return h('button', { type: 'button', class: 'wide', 'data-action': action, onclick }, text);
-}
-
-/**
- * Creates an element that shows a symbol of a formula; a Latin letter after a Greek one is its subscript, and so is the
- * part after an underscore.
- */
-export function symbol(text: string): HTMLElement {
-  const [, base = text, index = ''] = /^([α-ω])([A-Za-z])$/.exec(text) ?? /^(\w)_(\w+)$/.exec(text) ?? [];
-  return h('span', { class: 'symbol' }, base, ...(index ? [h('sub', {}, index)] : []));
-}
-
-/** Creates an icon from an SVG path on a 24 by 24 grid; decorative only, hidden from screen readers. */
-export function icon(path: string): SVGSVGElement {
-  const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
-  svg.setAttribute('viewBox', '0 0 24 24');
-  svg.setAttribute('class', 'icon');
-  svg.setAttribute('aria-hidden', 'true');
-  const shape = document.createElementNS('http://www.w3.org/2000/svg', 'path');
-  shape.setAttribute('d', path);
-  svg.append(shape);
-  return svg;
-}
-
 /** Returns the value of a custom property (design token) of the style sheet in the current colour scheme. */
 export function token(name: string): string {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();

@@ -3,7 +3,6 @@
  * what cannot be read, is named, so that the lab can say so.
  */
 import type { ParamValues, Vec3 } from '../engine/protocol';
-import type { Choice } from '../kit/field';
 import type { OptionsOf, ViewDeclaration, ViewOption } from '../kit/view';
 import { allIn, listOf, MOST_NAME, paramsIn, queryOf, readValue } from './link-query';
 
@@ -58,7 +57,7 @@ export const flag: Field<boolean> = {
 };
 
 /** One of the values of a selection list. */
-export const oneOfChoices = <const T extends string>(choices: readonly Choice<T>[]) =>
+export const oneOfChoices = <const T extends string>(choices: readonly { value: T }[]) =>
   oneOf(choices.map(({ value }) => value));
 
 /** One of several texts. */

@@ -92,7 +92,7 @@ export class VolumeScene {
   /** Takes over window and cut from the display of another volume. */
   takeOver(other: VolumeScene): void {
     this.#cut = other.#cut;
-    this.#bar.cut = other.#cut;
+    this.#bar.cut.value = other.#cut;
     this.#show(other.#window);
   }
 
@@ -134,10 +134,10 @@ export class VolumeScene {
     panel.host = {
       onProbe: (voxel) => this.#readOut(voxel),
       onZoom: () => {
-        this.#bar.isZoomed = this.panels.some(({ isZoomed }) => isZoomed);
+        this.#bar.isZoomed.value = this.panels.some(({ isZoomed }) => isZoomed);
       },
       adjustWindow: (event) => this.#adjustWindow(event),
-      isAdjusting: () => this.#bar.isAdjusting,
+      isAdjusting: () => this.#bar.adjusts.peek(),
     };
   }
 
@@ -165,7 +165,7 @@ export class VolumeScene {
   /** Shows position and intensity of the voxel under the pointer, or else at the crosshair. */
   #readOut(pointed?: Vec3): void {
     const voxel = pointed ?? this.#crosshair;
-    this.#bar.readout = text('slices.readout', {
+    this.#bar.readout.value = text('slices.readout', {
       place: text(pointed ? 'slices.atPointer' : 'slices.atCrosshair'),
       voxel: voxel.join(', '),
       space: this.volume.space,

@@ -1,7 +1,7 @@
 import type { ComponentChildren, InputHTMLAttributes, JSX } from 'preact';
 import { useLayoutEffect, useRef } from 'preact/hooks';
-import { showIn } from '../field';
 import { useId } from './id';
+import { showIn } from './typing';
 
 /**
  * A symbol of a formula; a Latin letter after a Greek one is its subscript, and so is the part after an underscore.
