@@ -170,9 +170,9 @@ describe('with a screen reader', LONG, () => {
         const note = (changes: MutationRecord[]) => {
           const line = document.querySelector('.status');
           const text = line?.textContent ?? '';
-          if (changes.some(({ target }) => target === line)) said.push({ time: performance.now(), text });
+          if (changes.some(({ target }) => line?.contains(target))) said.push({ time: performance.now(), text });
         };
-        new MutationObserver(note).observe(document, { childList: true, subtree: true });
+        new MutationObserver(note).observe(document, { childList: true, characterData: true, subtree: true });
         Object.assign(window, { said });
       });
       await page.goto(`${app.address}#${address}`);
