@@ -164,7 +164,7 @@ describe('progress', () => {
   });
 });
 
-/** What a translation has in common with its original: the parts of each step, and how many of what is in each of them. */
+/** Outline of a lesson, which a translation has in common with its original: the parts of each step, and how many of what is in each of them. */
 const outlineOf = ({ intro, steps }: Lesson) =>
   [{ intro }, ...steps.map(({ parts }) => parts)].map((parts) =>
     Object.entries(parts).map(([name, source]) => [
